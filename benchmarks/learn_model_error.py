@@ -19,10 +19,10 @@ from pathlib import Path
 
 import numpy as np
 
-from diagnosis.engine.calibration import WIDEST_CLASS, calibrate_with_error
+from diagnosis.engine.calibration import calibrate_with_error
 from diagnosis.engine.fit import calibrate
 from diagnosis.engine.gram import Given, gram_of, whitened_base
-from diagnosis.engine.learnt import error_classes
+from diagnosis.engine.learnt import error_classes, widest_class
 from diagnosis.engine.model_error import ModelError
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.proof.zoo.case import ZooPlan
@@ -130,8 +130,7 @@ def learnt(cases: Sequence[Healthy], start: Mapping[str, float], sweeps: int) ->
 
 
 def report(folder: Path, left_out: str | None, sweeps: int) -> None:
-    cases, classes = load(folder), error_classes()
-    (widest,) = (one for one in classes if one.name == WIDEST_CLASS)
+    cases, widest = load(folder), widest_class()
     found = learnt([case for case in cases if case.family != left_out], widest.amplitudes, sweeps)
     print("group      as it is    learnt")
     for group, value in found.items():

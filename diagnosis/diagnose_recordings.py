@@ -62,7 +62,7 @@ def diagnose(
         To learn from; see :func:`diagnosis.recordings.read.read_recordings` for files
     gearbox : Gearbox, name or path
     holdout : path, Recording, or several
-        To judge by; without any, the last quarter of every recording is held out
+        To judge by; without any, the last quarter of every stretch without a gap is held out
     baseline : path, Recording, or several
         The same machine in other sessions, without the effect that is looked for
     switched_off : str, or several

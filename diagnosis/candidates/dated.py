@@ -52,6 +52,15 @@ class Axis:
         """Typical distance of dates, [s]."""
         return self.end / max(len(self.dates), 1)
 
+    def clock(self, label: str) -> Parameter:
+        """Start of a recording on the axis, [s].
+
+        Its value for a machine that is not one of the recordings' is the end of the last one: what lasted until then
+        goes on.
+        """
+        return Parameter(name=f"{label}_start", unit="s", start=self.end, sd=0.0, lower=0.0, upper=10.0 * self.end,
+                         log=False, description="start of the recording on the axis that all share")  # fmt: skip
+
     def moment(self, name: str) -> Parameter:
         """A date as a parameter, [s]: not so late that next to nothing is recorded after it."""
         latest = 0.5 * (self.end + float(self.dates.max(initial=0.0)))
@@ -175,7 +184,7 @@ def changing(placed: Placed, course: DatedCourse, axis: Axis, *, sd: float | Non
         The last of its term's parameters is the clock
     """
     label = f"{placed.label}_{course.ending}"
-    term, clock = _renamed(placed, label), _clock(label, axis)
+    term, clock = _renamed(placed, label), axis.clock(label)
     strength, *shapes = term.parameters
     added = tuple(replace(p, name=f"{label}_{p.name}") for p in course.parameters)
     own = {symbol(p.name): symbol(f"{label}_{p.name}") for p in course.parameters}
@@ -207,7 +216,7 @@ def carried_on(placed: Placed, axis: Axis) -> Hypothesis:
         Without memories
     """
     label = f"{placed.label}_{CARRIED_ON}"
-    term, clock, base = _renamed(placed, label), _clock(label, axis), hypothesis_of(placed)
+    term, clock, base = _renamed(placed, label), axis.clock(label), hypothesis_of(placed)
     now = {symbol("time"): symbol("time") + symbol(clock.name)}
     other = term.boundary_temperature
     written = {symbol("time"): symbol("time") + symbol(START)}
@@ -219,16 +228,6 @@ def carried_on(placed: Placed, axis: Axis) -> Hypothesis:
     )  # fmt: skip
     variants = np.column_stack([base.variants, np.full(len(base.variants), clock.start)])
     return replace(base, term=term, variants=variants, how="carried_on", ending=CARRIED_ON, clock=clock.name)
-
-
-def _clock(label: str, axis: Axis) -> Parameter:
-    """Start of a recording on the axis.
-
-    Its value for a machine that is not one of the recordings' is the end of the last one: what lasted until then goes
-    on.
-    """
-    return Parameter(name=f"{label}_start", unit="s", start=axis.end, sd=0.0, lower=0.0, upper=10.0 * axis.end,
-                     log=False, description="start of the recording on the time axis of all recordings")  # fmt: skip
 
 
 def _renamed(placed: Placed, label: str) -> Placed:

@@ -80,6 +80,12 @@ class Hypothesis:
         return self.known_as or self.name
 
     @property
+    def added(self) -> Term:
+        """Its term, of one that is no parameter."""
+        assert self.term is not None, self.label  # noqa: S101
+        return self.term
+
+    @property
     def is_open(self) -> bool:
         """True if it is a mere form, of something that no catalogue has."""
         return self.family == OPEN_FORM
@@ -95,7 +101,7 @@ class Hypothesis:
     @property
     def of_measurement(self) -> bool:
         """True if it is a fault of a thermometer or of a recorded input."""
-        return self.term is not None and (self.term.of_measurement or self.term.kind == "sensor")
+        return self.term is not None and self.term.of_measurement
 
     @property
     def holds_a_reading(self) -> bool:

@@ -72,8 +72,7 @@ def _functions(network: ThermalNetwork, scale: Scale, node: str, now: sp.Expr) -
 def _unknown(network: ThermalNetwork, scale: Scale, axis: Axis, node: str, is_loss: bool) -> Hypothesis:
     name = "unknown_loss" if is_loss else "unknown_heat"
     label = f"{name}_{node}"
-    clock = Parameter(name=f"{label}_start", unit="s", start=axis.end, sd=0.0, lower=0.0, upper=10.0 * axis.end,
-                      log=False)  # fmt: skip
+    clock = axis.clock(label)
     functions = _functions(network, scale, node, symbol("time") + symbol(clock.name))
     size = SHARE * (scale.loss or scale.conductance * TYPICAL_RISE)
     strength = Parameter(name=f"{label}_strength", unit="W", start=0.0, sd=size, lower=-100.0 * size,

@@ -37,14 +37,13 @@ from diagnosis.decision.scanned import (
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.families import with_priors
-from diagnosis.engine.fit import Fit
+from diagnosis.engine.fit import NO_SOLUTION, Fit
 from diagnosis.engine.learnt import ErrorClass, rule
 from diagnosis.engine.outside import judge_outside
 from diagnosis.engine.refit import refit
 from diagnosis.engine.scan import scan
 from diagnosis.engine.sessions import fit_over_sessions
 from diagnosis.engine.switch_grid import held_numbers, with_refined_switches
-from models.base.errors import InputError
 from models.base.progress import Progress, silent
 
 StartOf = Callable[[ErrorClass], Fit]  # where fits with model error of a class begin
@@ -184,7 +183,7 @@ def _with_course_of(calibration: Calibration, best: Judged, one: Judged) -> Judg
     start = calibration.in_class(one.error_class).fit
     try:
         reached = refit(start, replace(one.effects[0], variants=shape), 0, own[0], iterations=RACE_STEPS)
-    except (InputError, ArithmeticError, np.linalg.LinAlgError):
+    except NO_SOLUTION:
         return one
     return _fitted_on(calibration, _judged(calibration, replace(one, fit=reached), spread=0.0))
 
@@ -214,7 +213,7 @@ def _refitted(fit: Fit, found: Scanned, index: int, iterations: int) -> Judged:
             strength = float(here.strengths.value[index])
             reached = refit(fit, candidate, here.scan.best[index], strength, further=here.scan.starts[index],
                             iterations=iterations)  # fmt: skip
-    except (InputError, ArithmeticError, np.linalg.LinAlgError):
+    except NO_SOLUTION:
         return one
     return replace(one, fit=reached)
 
@@ -254,7 +253,7 @@ def _fitted_on(calibration: Calibration, one: Judged) -> Judged:
         if held:  # between two points of the grid
             free = fit.experiment.fit(reached.z, at=reached.linearised)
             reached = min(reached, free, key=lambda one: one.objective)
-    except (InputError, ArithmeticError, np.linalg.LinAlgError):
+    except NO_SOLUTION:
         pass  # what was reached counts
     if reached is fit:
         return one
@@ -316,7 +315,7 @@ def _nothing_gains(calibration: Calibration, best: Judged) -> tuple[float, Fit |
         reached = fit_over_sessions(there, len(there.z)).log_evidence + float(np.log(best.error_class.prior))
         if reached > found:
             found, alone = reached, there
-    except (InputError, ArithmeticError, np.linalg.LinAlgError):
+    except NO_SOLUTION:
         pass  # what is known counts
     return found - calibration.chosen.log_evidence, alone
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from diagnosis.engine.fit import FIRST_ITERATIONS, ITERATIONS, Experiment, Fit, Linear
 from diagnosis.engine.gram import Gram, gram_of, whitened_base
-from diagnosis.engine.learnt import ErrorClass, error_classes
+from diagnosis.engine.learnt import ErrorClass, error_classes, widest_class
 from diagnosis.engine.metric import Metric, leading_directions
 from diagnosis.engine.model_error import ModelError
 from diagnosis.engine.sessions import fit_over_sessions, most_deviation, over_sessions
@@ -21,7 +21,6 @@ from models.base.types import Array
 TURNS = 3  # with the chosen class: point, columns of model error and deviation between sessions settle together
 LONGEST = 16.0  # times as long as assumed, random heats may last where only the form of the laws is known
 WORTH = 1.0  # nats that another random heat has to bring
-WIDEST_CLASS = "full"  # the point is calibrated with it: no parameter has to stand in for what the model cannot know
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -259,8 +258,7 @@ def calibrate_with_error(experiment: Experiment, start: Fit, apart: Collection[s
 
 
 def _calibrated(experiment: Experiment, error: ModelError, start: Fit) -> Calibration:
-    classes = error_classes()
-    (widest,) = (one for one in classes if one.name == WIDEST_CLASS)
+    widest = widest_class()  # no parameter has to stand in for what the model cannot know
     # There may be several basins: without model error, parameters may have gone far to stand in for it.
     middles = experiment.fit(np.zeros(len(experiment.unknowns)), iterations=0)
     first = [NearReadings.of(experiment, error, one).fitted(widest, one) for one in (start, middles)]

@@ -25,6 +25,7 @@ NEAR = 0.5  # of a prior sd: every other time, after so short a step, the column
 FARTHEST_STEP = 3.0  # of the z in one iteration
 SLOW_PATIENCE = 3  # times as many iterations where switches follow slow measurements: steps are small there
 NOISE_ALONE = Metric()
+NO_SOLUTION = (InputError, ArithmeticError, np.linalg.LinAlgError)  # what a simulation or fit raises that has none
 Guess = Trajectory | Array | None
 
 
@@ -312,7 +313,7 @@ class Experiment:
                          for i, (guess, error) in enumerate(zip(guesses, errors, strict=True))]  # fmt: skip
             with np.errstate(over="raise"):  # a trial that overflows has no solution
                 return Linearised.of(parts, self.metric)
-        except (InputError, ArithmeticError, np.linalg.LinAlgError):
+        except NO_SOLUTION:
             return None
 
     def _assumed(self, guess: Guess) -> ErrorCourse | None:

@@ -90,13 +90,12 @@ class Strengths:
     ----------
     log_bayes : Array, shape (n,)
         Log Bayes factor against nothing
-    value, sd : Array, shape (n,)
-        Most probable strength and its standard deviation
+    value : Array, shape (n,)
+        Most probable strength
     """
 
     log_bayes: Array
     value: Array
-    sd: Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -140,21 +139,6 @@ class Given:
         inner = scale[:, None] * self.matrix[np.ix_(at, at)] * scale + np.eye(len(at))
         return np.asarray(scale * np.linalg.solve(inner, scale * self.matrix[at, 0]))
 
-    def singles(self, candidates: Index, sd: Array | float, sign: Signs | int = 0) -> Strengths:
-        """Every candidate alone.
-
-        Parameters
-        ----------
-        candidates : sequence of int
-            Places among the columns
-        sd : Array, shape (n,), or float
-            Prior of the strengths
-        sign : Array of int, shape (n,), or int
-            Which strengths are possible: -1, 1, or 0 for both
-        """
-        at = np.asarray(candidates, dtype=int) + 1
-        return strengths(self.matrix[0, at], self.matrix[at, at], sd, sign)
-
 
 def strengths(a: Array, b: Array, sd: Array | float, sign: Signs | int = 0) -> Strengths:
     """Evidence and size of columns, each alone.
@@ -163,8 +147,10 @@ def strengths(a: Array, b: Array, sd: Array | float, sign: Signs | int = 0) -> S
     ----------
     a, b : Array, shape (n,)
         Inner products with the residual, and with itself
-    sd, sign
-        See :meth:`Given.singles`
+    sd : Array, shape (n,), or float
+        Prior of the strengths
+    sign : Array of int, shape (n,), or int
+        Which strengths are possible: -1, 1, or 0 for both
     """
     b = np.maximum(b, 0.0)
     sd, sign = np.broadcast_to(np.asarray(sd, float), a.shape), np.broadcast_to(np.asarray(sign), a.shape)
@@ -172,7 +158,7 @@ def strengths(a: Array, b: Array, sd: Array | float, sign: Signs | int = 0) -> S
     value, own = a / precision, 1.0 / np.sqrt(precision)
     log_bayes = 0.5 * a * value - 0.5 * np.log1p(b * np.square(sd))
     log_bayes = log_bayes + np.where(sign != 0, np.log(2.0) + log_ndtr(sign * value / own), 0.0)
-    return Strengths(log_bayes=np.where(b > LEAST, log_bayes, 0.0), value=value, sd=own)
+    return Strengths(log_bayes=np.where(b > LEAST, log_bayes, 0.0), value=value)
 
 
 def whitened_base(parts: Sequence[Linear], z: Array, error: Sequence[Array] = ()) -> list[Array]:

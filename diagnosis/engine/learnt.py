@@ -122,8 +122,14 @@ def _document() -> Mapping[str, Any]:
 
 @cache
 def error_classes() -> tuple[ErrorClass, ...]:
-    """Classes of model error with their priors; the largest of the study is ``full``."""
+    """Classes of model error with their priors."""
     return tuple(ErrorClass(**one) for one in _document()["class"])
+
+
+@cache
+def widest_class() -> ErrorClass:
+    """The class with most model error."""
+    return next(one for one in error_classes() if one.name == "full")
 
 
 @cache

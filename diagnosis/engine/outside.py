@@ -48,9 +48,8 @@ def judge_outside(fit: Fit, hypotheses: Sequence[Hypothesis]) -> list[tuple[Hypo
     over = over_sessions(found.gram, fit.experiment, [*found.unknowns, *found.further])
     judged, first = [], 0
     for one in hypotheses:
-        assert one.term is not None  # noqa: S101 - it is a heat
         columns = found.of_candidates[first : first + len(one.variants)]
-        each = [judged_together(given, columns, one.term.strength.sd) for given in over.given]
+        each = [judged_together(given, columns, one.added.strength.sd) for given in over.given]
         log_bayes = over.weighed([np.array([value]) for value, _ in each])
         weights = each[over.most_probable][1]
         judged.append((shaped(one, weights), float(log_bayes[0])))
@@ -66,7 +65,7 @@ def judged_together(given: Given, columns: Index, sd: float) -> tuple[float, Arr
     given : Given
         With everything else that is unknown marginalised
     columns : sequence of int
-        Places among the labels
+        Places among the columns of the Gram matrix
     sd : float
         Prior of the weights
 

@@ -164,7 +164,7 @@ class Point:
 
     @property
     def machine(self) -> Machine:
-        """The network."""
+        """What is simulated."""
         return self.setting.machine
 
     @property

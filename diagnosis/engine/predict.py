@@ -182,11 +182,8 @@ def overall_rmse(predictions: Sequence[Prediction], columns: Sequence[int]) -> f
 
 def with_pieces_of(experiment: Experiment, other: Experiment) -> Experiment:
     """Machine and unknowns of one experiment with the recordings of another one, judged by noise alone."""
-    return replace(
-        experiment, pieces=other.pieces, noise=other.noise, starts=other.starts, filters=other.filters,
-        metric=NOISE_ALONE, starts_at=other.starts_at or experiment.starts_at,
-        session_of=other.session_of or experiment.session_of,
-    )  # fmt: skip
+    return replace(experiment, pieces=other.pieces, noise=other.noise, starts=other.starts, filters=None,
+                   metric=NOISE_ALONE)  # fmt: skip
 
 
 def log_score_gain(

@@ -94,8 +94,7 @@ def with_candidate(fit: Fit, candidate: Hypothesis, variant: int) -> tuple[Exper
     experiment : Experiment
     z : Array, shape (further unknowns,)
     """
-    experiment, term = fit.experiment, candidate.term
-    assert term is not None  # noqa: S101 - parameters out of their priors have no term
+    experiment, term = fit.experiment, candidate.added
     machine = experiment.machine
     if candidate.in_network:
         machine = Machine(NetworkOnGrid(term.apply(machine.model.network), machine.model.losses), machine.terms)

@@ -78,7 +78,8 @@ class Scan:
 
     def singles(self, given: Given) -> Strengths:
         """Every candidate alone, in its best shape; the sign of a clock fault is that of its variant."""
-        return given.singles(self.of_candidates, self.sd, self.sign)
+        at = self.of_candidates + 1
+        return strengths(given.matrix[0, at], given.matrix[at, at], self.sd, self.sign)
 
     def means(self, given: Given) -> Array:
         """Log Bayes factor of every candidate, mean over its variants, shape (candidates,)."""
@@ -156,15 +157,14 @@ def _outside(unknown: int) -> _Shape:
 
 def _best_shape(candidate: Hypothesis, at: int, a: Array, b: Array, peaks_K: Array, peaks_W: Array) -> _Shape:
     """Compare all shapes of a candidate, by their inner products with the residual and with themselves."""
-    assert candidate.term is not None  # noqa: S101 - parameters outside their priors have one shape
-    sd, way = candidate.term.strength.sd, np.sign(candidate.variants[:, 0]).astype(int)
+    sd, way = candidate.added.strength.sd, np.sign(candidate.variants[:, 0]).astype(int)
     sign = way if len(set(way.tolist())) > 1 else np.full(len(way), candidate.sign)
     found = strengths(a, b, sd, sign)
     best = int(np.argmax(found.log_bayes))
     mean = float(np.logaddexp.reduce(found.log_bayes) - np.log(len(way)))
     return _Shape(at=at, sd=sd, variant=best, log_bayes=mean, spread=float(found.log_bayes[best]) - mean,
                   sign=int(sign[best]), peak_K=float(peaks_K[best]), peak_W=float(peaks_W[best]),
-                  starts=_further_starts(candidate.term, candidate.variants[:, 0], found, best))  # fmt: skip
+                  starts=_further_starts(candidate.added, candidate.variants[:, 0], found, best))  # fmt: skip
 
 
 def _further_starts(term: Term, sizes: Array, found: Strengths, best: int) -> Starts:
@@ -227,8 +227,7 @@ def _by_clock(candidate: Hypothesis, starts_at: float | None) -> Array:
     """Variants of a candidate in a recording that starts at a time of the shared axis, shape (V, parameters)."""
     if candidate.clock is None or starts_at is None:
         return candidate.variants
-    assert candidate.term is not None  # noqa: S101 - it has a parameter
-    names = [p.name for p in candidate.term.parameters]
+    names = [p.name for p in candidate.added.parameters]
     values = np.array(candidate.variants)
     values[:, names.index(candidate.clock)] = starts_at
     return values

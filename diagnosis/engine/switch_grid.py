@@ -66,9 +66,8 @@ def refined(fit: Fit, candidate: Hypothesis, shapes: Sequence[int]) -> tuple[Hyp
     strength : float
         That the scan promises
     """
-    assert candidate.term is not None  # noqa: S101 - it switches
-    at = switch_numbers(candidate.term)
-    reaches = [_to_a_neighbour(candidate.term.parameters[i]) for i in at]
+    at = switch_numbers(candidate.added)
+    reaches = [_to_a_neighbour(candidate.added.parameters[i]) for i in at]
     some = replace(candidate, variants=candidate.variants[list(dict.fromkeys(shapes))])
     found, strength, _ = finer_scans(fit, some, at, reaches)
     return found, strength
@@ -134,8 +133,7 @@ def finer_scans(
     strength, gain : float
         That the scan promises, and nats that it is ahead of the mean over the shapes before
     """
-    assert candidate.term is not None  # noqa: S101 - parameters out of their priors have no shapes
-    parameters, before, strength, gain = [candidate.term.parameters[i] for i in at], candidate, 0.0, 0.0
+    parameters, before, strength, gain = [candidate.added.parameters[i] for i in at], candidate, 0.0, 0.0
     for level in range(levels):
         steps = np.linspace(-1.0, 1.0, points) * (2.0 / (points - 1)) ** level
         variants = [

@@ -113,7 +113,7 @@ def simulate(
     rounds: int = ROUNDS,
     settled_K: float = SETTLED_K,
 ) -> Trajectory:
-    """The free-running trajectory of a piece.
+    """The trajectory of a piece, by rounds of linear solutions about the one before.
 
     Parameters
     ----------

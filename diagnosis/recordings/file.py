@@ -127,8 +127,8 @@ def open_recording(path: Path, mapping: Path | None, usual: RecordingMapping) ->
     start: float | None = None
     units: Mapping[str, str] = {}
     if kind in (".mf4", ".mdf"):
-        base = next((name for name, column in found.columns.items() if column.quantity == "speed"), "speed_rpm")
-        table, units, start = read_mdf(path, base=base)
+        speed = [name for name, column in found.columns.items() if column.quantity == "speed"]
+        table, units, start = read_mdf(path, bases=list(dict.fromkeys([*speed, "speed_rpm", *found.columns])))
         chunks = iter([without(found.missing, table)])
     else:
         units = {} if kind == ".parquet" else column_units(path, found.text_form)

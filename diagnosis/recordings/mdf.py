@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -15,13 +16,14 @@ from models.base.errors import InputError
 FARTHEST_STEPS = 1.5  # of the usual time between rows, that a sample may be from its row
 
 
-def read_mdf(path: Path, *, base: str) -> tuple[pd.DataFrame, dict[str, str], float]:
+def read_mdf(path: Path, *, bases: Sequence[str]) -> tuple[pd.DataFrame, dict[str, str], float]:
     """Read the numeric channels of an MDF file as one table.
 
     Parameters
     ----------
-    base : str
-        Channel whose times become the rows; a sample of another channel goes to the nearest row, several to their mean
+    bases : sequence of str
+        Channels, of which the first that the file has gives the rows; a sample of another channel goes to the nearest
+        row, several to their mean
 
     Returns
     -------
@@ -36,7 +38,7 @@ def read_mdf(path: Path, *, base: str) -> tuple[pd.DataFrame, dict[str, str], fl
     Raises
     ------
     InputError
-        If asammdf is not installed, or the file cannot be read or lacks `base`.
+        If asammdf is not installed, or the file cannot be read or has none of `bases`.
     """
     if find_spec("asammdf") is None:
         raise InputError(f"{path}: reading MDF4 needs asammdf; python -m pip install asammdf")
@@ -64,7 +66,7 @@ def read_mdf(path: Path, *, base: str) -> tuple[pd.DataFrame, dict[str, str], fl
         text = str(error).strip().splitlines()
         raise InputError(f"{path}: cannot be read as mf4: {text[0] if text else type(error).__name__}") from error
     groups, units = _named_apart(groups, units)
-    return _on_rows_of(base, groups, path), {n: unit for own in units for n, unit in own.items() if unit}, start
+    return _on_rows_of(bases, groups, path), {n: unit for own in units for n, unit in own.items() if unit}, start
 
 
 def _named_apart(
@@ -82,11 +84,12 @@ def _named_apart(
     )
 
 
-def _on_rows_of(base: str, groups: list[pd.DataFrame], path: Path) -> pd.DataFrame:
+def _on_rows_of(bases: Sequence[str], groups: list[pd.DataFrame], path: Path) -> pd.DataFrame:
     names = [str(name) for frame in groups for name in frame.columns]
-    if base not in names:
+    base = next((name for name in bases if name in names), None)
+    if base is None:
         shown = ", ".join(sorted(names)[:20]) or "no numeric channel"
-        raise InputError(f"{path}: channel {base} is missing; it has: {shown}")
+        raise InputError(f"{path}: channel {' or '.join(bases)} is missing; it has: {shown}")
     time = next(frame for frame in groups if base in frame.columns).index.to_numpy(dtype=np.float64)
     if len(time) == 0:
         raise InputError(f"{path}: channel {base} has no samples")

@@ -173,8 +173,7 @@ class Clock:
             return values.dt.tz is None
         if self.unit != ISO:
             return "%z" not in self.unit
-        found = _ISO.fullmatch(str(values.iloc[0]).strip())
-        return found is not None and found["zone"] is None
+        return bool(_zones(values.iloc[:1])[1][0])
 
     def seconds(self, values: pd.Series) -> Array:
         """Convert a time column, shape (rows,), to [s], dates since 1970; NaN for a cell that is no time."""
@@ -193,10 +192,8 @@ class Clock:
             texts, has_zone = values.astype(str).str.strip(), "%z" in self.unit
             stamps = self._zoned(pd.to_datetime(texts, format=self.unit, utc=has_zone, errors="coerce"))
         else:
+            aware, naive = _zones(values)
             texts = values.astype(str).str.strip().str.replace(",", ".")
-            found = [_ISO.fullmatch(text) for text in texts.tolist()]  # quicker than a Series
-            aware = np.array([match is not None and match["zone"] is not None for match in found], dtype=bool)
-            naive = np.array([match is not None and match["zone"] is None for match in found], dtype=bool)
             stamps = pd.to_datetime(texts.where(aware), format="ISO8601", utc=True, errors="coerce")
             if naive.any():
                 local = pd.to_datetime(texts.where(naive), format="ISO8601", errors="coerce")
@@ -432,13 +429,18 @@ def _check_time_unit(name: str, seconds: Array, step: float, clock: Clock, probl
         problems.add(f"{name} advances by {step:.3g} s from row to row (median); {meant} {fix}, or average to seconds")
 
 
+def _zones(values: pd.Series) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Cells that are a date with a time zone, and those that are one without, shape (rows,) each."""
+    found = [_ISO.fullmatch(text.strip()) for text in values.astype(str).tolist()]  # quicker than a Series
+    aware = np.array([match is not None and match["zone"] is not None for match in found], dtype=bool)
+    return aware, np.array([match is not None for match in found], dtype=bool) & ~aware
+
+
 def _check_zones(values: pd.Series, name: str, rows: NDArray[np.int64], problems: Problems) -> None:
     if pd.api.types.is_datetime64_any_dtype(values.dtype):
         return
-    texts = values.astype(str).str.strip()
-    zoned = texts.str.contains(r"(?:Z|[+-]\d{2}(?::?\d{2})?)$", regex=True).to_numpy(dtype=bool)
-    zoned = zoned & ~texts.str.fullmatch(_DATE).to_numpy(dtype=bool)  # the day of a date looks like a zone
-    if not zoned.all() and zoned.any():
+    zoned, without = _zones(values)
+    if zoned.any() and without.any():
         row = int(np.flatnonzero(zoned != zoned[0])[0])
         problems.add(
             f"{name} has times with and without a time zone (rows {rows[0]} and {rows[row]}); give all of them one"

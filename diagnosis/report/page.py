@@ -89,7 +89,7 @@ def _evidence(diagnosis: Diagnosis) -> dict[str, Any]:
     found, needed = diagnosis.log_e_value, diagnosis.threshold
     end = max(2.0 * needed, found, 1.0)
     return {
-        "reached": found >= needed,
+        "reached": found > needed,
         "length": 100.0 * max(found, 0.0) / end,
         "threshold": 100.0 * max(needed, 0.0) / end,
     }

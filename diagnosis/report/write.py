@@ -14,6 +14,7 @@ from diagnosis.forward.sensor_fault import channel_column
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.result import Diagnosis
 from models.assembly.gearbox import Gearbox
+from models.base.atomic_write import atomic_file
 from models.base.errors import InputError
 from models.correction.correction import MODEL_ERROR, SHAPE, Correction, Estimate, Finding, write_correction
 from models.files.output_files import refuse_to_replace
@@ -129,6 +130,26 @@ def prediction_table(diagnosis: Diagnosis, recording: Recording) -> pd.DataFrame
     return pd.DataFrame(columns)
 
 
+def write_report(diagnosis: Diagnosis, path: str | Path) -> None:
+    """Write a diagnosis as one HTML file.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file appears whole or not at all
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    from diagnosis.report.page import page  # loads plotly
+
+    text = page(diagnosis)
+    with atomic_file(Path(path)) as partial:
+        partial.write_text(text, encoding="utf-8", newline="\n")
+
+
 def write_files(
     diagnosis: Diagnosis, gearbox: Gearbox, recordings: Sequence[Recording], folder: str | Path
 ) -> tuple[Path, ...]:
@@ -139,8 +160,6 @@ def write_files(
     tuple of Path
         What was written, the report first
     """
-    from diagnosis.report import write_report
-
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     report, numbers, correction, alone, posterior, *predictions = (folder / name for name in names_of_files(recordings))

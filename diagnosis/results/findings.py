@@ -13,7 +13,7 @@ from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.answer import Answer
 from diagnosis.decision.posterior import Posterior
 from diagnosis.engine.fit import Experiment, Fit
-from diagnosis.engine.unknown import SensorBias, Unknown
+from diagnosis.engine.unknown import SensorBias
 from diagnosis.forward.grid import Piece
 from diagnosis.forward.term_on_grid import TermOnGrid
 from diagnosis.recordings.recording import Recording
@@ -31,7 +31,6 @@ from models.terms.term import Term
 EITHER = (("smaller or greater", "smaller", "greater"), ("more or less", "less", "more"))
 UNIT_SLIP = 6.0  # times its value or less that a factor of a loss rarely is; units differ by 9.5, 60, 1000
 FORM_ERROR = 0.1  # of a strength and its heat: laws of the literature are hardly known better
-SLOPE_STEP = 1e-4  # of a prior standard deviation
 BAND_SD = 2.0  # 95 %
 HOT_DEGC = 1e6
 Values = Mapping[str, tuple[float, float]]
@@ -156,17 +155,11 @@ def _rivals(answer: Answer, setup: InferenceSetup, posterior: Posterior) -> tupl
 # ---------------------------------------------------------------------- parameters
 
 
-def slope(unknown: Unknown, z: float) -> float:
-    """Magnitude of the change of a value with `z`; at a bound that to the inside."""
-    here = unknown.value(z)
-    return max(abs(unknown.value(z + way) - here) for way in (SLOPE_STEP, -SLOPE_STEP)) / SLOPE_STEP
-
-
 def estimates_of(fit: Fit) -> Values:
     """Value and standard error of every unknown, by the name of its parameter."""
     sd = np.sqrt(np.diag(fit.covariance))
     return {
-        unknown.parameter.name: (unknown.value(z), slope(unknown, z) * error)
+        unknown.parameter.name: (unknown.value(z), unknown.per_z(z) * error)
         for unknown, z, error in zip(fit.experiment.unknowns, fit.z.tolist(), sd.tolist(), strict=True)
     }
 
@@ -249,7 +242,7 @@ def _whole_bias(fit: Fit, term: Term) -> tuple[float, float]:
               or (isinstance(unknown, SensorBias) and unknown.channel == term.target[0])]  # fmt: skip
     unknowns, pick = [fit.experiment.unknowns[i] for i in chosen], np.zeros(len(fit.z))
     zs = fit.z[chosen].tolist()
-    pick[chosen] = [slope(unknown, z) for unknown, z in zip(unknowns, zs, strict=True)]
+    pick[chosen] = [unknown.per_z(z) for unknown, z in zip(unknowns, zs, strict=True)]
     total = sum(unknown.value(z) for unknown, z in zip(unknowns, zs, strict=True))
     return float(total), float(np.sqrt(pick @ fit.covariance @ pick))
 
@@ -304,9 +297,8 @@ def mean_heat_of(fit: Fit, effect: Hypothesis) -> tuple[float, float]:
 
 def _heats_with(fit: Fit, effect: Hypothesis, values: Array) -> list[Array]:
     """Heat with each row of `values`, the first as fitted, for its parameters; shape (K, rows) per piece, [W]."""
-    assert effect.term is not None  # noqa: S101 - only a term brings heat
     experiment = fit.experiment
-    term, result = TermOnGrid(experiment.machine.model, effect.term), []
+    term, result = TermOnGrid(experiment.machine.model, effect.added), []
     for part in fit.parts:
         trajectory = part.point.trajectory
         recording, here = trajectory.piece.recording, np.array(values)

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from diagnosis.decision.posterior import Repeating, ScaledError
+from diagnosis.engine.learnt import widest_class
 from diagnosis.results.number_format import MINUS, number, share, with_error
 from diagnosis.results.result_parts import (
     LEAST_RIVAL,
@@ -41,7 +42,6 @@ EITHER = "The measurement is at fault, or the model leaves out physics: these da
 MISSED = "What was learnt from agrees with the model; held-out {names} not."
 UNFIT = "The model cannot be brought to fit these recordings, and why has no name."
 SIZES = {0.5: "half as large", 1.0: "as assumed", 2.0: "twice as large"}  # of model error, by factor
-LARGEST_ERROR = "full"  # class of model error
 FAR_SD, MOST_FAR = 3.0, 3  # standard deviations of a prior, beyond which the summary tells of a parameter; how many
 MOST_UNSEEN = 6  # effects that the summary names of those that cannot be seen
 OF_DATE = ("since", "lasting")  # parameters that the date contains
@@ -105,8 +105,8 @@ def _missing(d: Diagnosis) -> str:
             "wrong columns, other units, and a wrong definition."
         )
     where = " in what was learnt from" if d.missed else ""
-    off = max((one.calibrated, what) for one, what in ((d.train, "learnt from"), (d.holdout, "held out"))
-              if not math.isnan(one.calibrated))  # fmt: skip
+    off = max(((one.calibrated, what) for one, what in ((d.train, "learnt from"), (d.holdout, "held out"))
+               if not math.isnan(one.calibrated)), default=(0.0, ""))  # fmt: skip
     doubt = (
         f" But calibrated, the model is {off[0]:.2f} K off what was {off[1]}: it fits this machine badly, and an "
         "effect may hide in that."
@@ -195,7 +195,9 @@ def _how_sure(d: Diagnosis) -> tuple[str, ...]:
         lines.append(f"Known before, and part of the model as delivered: {known}.")
     if d.error_class:
         hides = ", the largest, because the model fits badly: a real effect can hide in it"
-        lines.append(f"Model error assumed: class {d.error_class}{hides if d.error_class == LARGEST_ERROR else ''}.")
+        lines.append(
+            f"Model error assumed: class {d.error_class}{hides if d.error_class == widest_class().name else ''}."
+        )
     if d.scaled_error and d.log_e_value > d.threshold:
         lines.append(robustness_told(d.scaled_error))
     lines += _sessions_told(d)

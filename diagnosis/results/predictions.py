@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -122,7 +122,7 @@ def _states(
 def _predictions(
     fit: Fit, pieces_of: Experiment, near: Sequence[Array | None], jobs: int, *, as_delivered: bool = False
 ) -> list[Prediction]:  # fmt: skip
-    there = replace(with_pieces_of(fit.experiment, pieces_of), filters=None)
+    there = with_pieces_of(fit.experiment, pieces_of)
     z = None if as_delivered else fit.z
     return run_parallel(_predict, [(there, index, z, T) for index, T in enumerate(near)], jobs=jobs)
 

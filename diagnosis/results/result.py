@@ -96,7 +96,7 @@ class Diagnosis:
     inputs : mapping
         Hashes and version
     notes : tuple of str
-        What was cleaned in the recordings
+        What was cleaned in the recordings; what baselines show; what recordings cannot identify
     kinds : mapping of str to float
         Probability of every kind of explanation: nothing, parameter, measurement, mechanism, pair, outside
     settings : Settings

@@ -117,7 +117,7 @@ def prepare(
     Parameters
     ----------
     holdout : sequence of Recording
-        Without any the last quarter of every recording is held out
+        Without any the last quarter of every stretch without a gap is held out
     baseline : sequence of Recording
         To learn from as well, as a whole; they do not decide on the scale
     even : bool

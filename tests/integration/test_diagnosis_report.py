@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from diagnosis.report import write_report
+from diagnosis.report.write import write_report
 from tests.unit.diagnosis.diagnosis_example import EXAMPLES
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)

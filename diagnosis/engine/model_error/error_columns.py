@@ -95,19 +95,11 @@ class ModelError:
                 reading[:, point.sensors.channels.index(change.channel), mine.start] = change.reading(view)
         return ErrorCourses(heat=into, loss=loss, reading=reading)
 
-    def responses(self, point: Point, first: int = 0, last: int | None = None) -> Array:
-        """Change of what is recorded per unit of some unknowns, shape (K + 1, channels, n); see :meth:`columns`."""
-        last = len(self.groups) if last is None else last
-        result = np.empty((*point.read.shape, last - first))
-        for begin, end in self._chunks(point, first, last):
-            result[:, :, begin - first : end - first] = _recorded(point, self.columns(point, begin, end))
-        return result
-
     def whitened(self, part: Linear) -> Array:
         """Whitened columns of all unknowns per unit, shape (M, unknowns)."""
         result = np.empty((len(part.residual), len(self.groups)))
-        for begin, end in self._chunks(part.point, 0, len(self.groups)):
-            result[:, begin:end] = part.filter(self.responses(part.point, begin, end))
+        for begin, end in self._chunks(part.point):
+            result[:, begin:end] = part.filter(_recorded(part.point, self.columns(part.point, begin, end)))
         return result
 
     def combined_responses(self, point: Point, combinations: Array) -> Array:
@@ -125,7 +117,7 @@ class ModelError:
         wanted = np.asarray(combinations.any(axis=1))
         heat = np.zeros((points - 1, point.trajectory.decay.shape[-1], count))
         loss, reading = np.zeros((points - 1, count)), np.zeros((points, channels, count))
-        for begin, end in self._chunks(point, 0, len(self.groups)):
+        for begin, end in self._chunks(point):
             found, some = self.columns(point, begin, end, wanted), combinations[begin:end]
             for part in range(heat.shape[1]):
                 acting = np.flatnonzero(found.heat[:, part].any(axis=0))  # most heat few parts
@@ -135,10 +127,10 @@ class ModelError:
             reading += found.reading[:, :, acting] @ some[acting]
         return ErrorCourses(heat=heat, loss=loss, reading=reading)
 
-    def _chunks(self, point: Point, first: int, last: int) -> Iterator[tuple[int, int]]:
+    def _chunks(self, point: Point) -> Iterator[tuple[int, int]]:
         """Ranges of so many unknowns as memory allows at once."""
-        size = columns_at_once(len(point.trajectory.piece.steps))
-        return ((begin, min(begin + size, last)) for begin in range(first, last, size))
+        size, count = columns_at_once(len(point.trajectory.piece.steps)), len(self.groups)
+        return ((begin, min(begin + size, count)) for begin in range(0, count, size))
 
     def between(self, first: int, last: int) -> Iterator[tuple[Change, int, int]]:
         """Changes with unknowns in a range; the first unknown of each and the one after its last."""

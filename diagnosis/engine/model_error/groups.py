@@ -1,7 +1,7 @@
 """The groups of model error: one declaration each of what it changes, where, and along which courses.
 
 Every group lists changes for a machine by rules of its structure, never by names, so that they hold for every
-definition. The first ten are the base groups; the others are finer and belong to the largest class only.
+definition. The first eleven are the base groups; the others are finer and belong to the largest class only.
 """
 
 from __future__ import annotations

@@ -85,11 +85,10 @@ def test_an_unknown_heat_is_judged_over_deviations_between_sessions(
     fit = calibrate(experiment)
     whole = next(one for one in outside_of(setup, experiment) if one.place == "oil")
     function = replace(whole, variants=whole.variants[1:2])
-    assert function.term is not None
     found = scan(fit, [function])
     over = over_sessions(found.gram, experiment, found.unknowns)
-    sizes = [over.weighed([given.singles(found.of_candidates, size * function.term.strength.sd).log_bayes
-                           for given in over.given]) for size in SIZES]  # fmt: skip
+    sizes = [over.weighed([replace(found, sd=size * found.sd).singles(given).log_bayes for given in over.given])
+             for size in SIZES]  # fmt: skip
     ((_, log_bayes),) = judge_outside(fit, [function])
     assert log_bayes == pytest.approx(float(np.log(np.mean(np.exp(sizes)))), rel=1e-9)
 

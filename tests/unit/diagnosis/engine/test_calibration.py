@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.engine.calibration import WIDEST_CLASS, Calibration, NearReadings, calibrate_with_error, recalibrate
+from diagnosis.engine.calibration import Calibration, NearReadings, calibrate_with_error, recalibrate
 from diagnosis.engine.fit import Experiment, calibrate
-from diagnosis.engine.learnt import error_classes
+from diagnosis.engine.learnt import error_classes, widest_class
 from diagnosis.engine.model_error import ModelError
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.sessions import fit_over_sessions
@@ -17,7 +17,7 @@ from diagnosis.forward.whitening import RandomHeat
 from models.assembly.gearbox import Gearbox
 from tests.unit.diagnosis.inference_example import recorded, with_measured
 
-WIDEST = next(one for one in error_classes() if one.name == WIDEST_CLASS)
+WIDEST = widest_class()
 
 
 @pytest.fixture(scope="module")

@@ -57,8 +57,8 @@ def test_evidence_is_the_normal_density(gram: Gram, columns: dict[str, Array]) -
 def test_singles_are_ratios_of_densities(gram: Gram, columns: dict[str, Array]) -> None:
     both, base, sd = np.concatenate(list(columns.values())), [0, 1, 2, 3], np.array([0.4, 3.0, 1.0, 0.2, 0.9])
     given, nothing = gram.given(base), log_density(both, base)
-    at = 7 + np.arange(5)
-    for k, found in enumerate(given.singles(at, sd).log_bayes):
+    at = 8 + np.arange(5)  # the residual is first
+    for k, found in enumerate(strengths(given.matrix[0, at], given.matrix[at, at], sd).log_bayes):
         own = np.array([1.0] * 4 + [sd[k]])
         assert found == pytest.approx(log_density(both, [*base, 7 + k], own) - nothing, abs=1e-9)
 

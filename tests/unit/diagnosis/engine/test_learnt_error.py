@@ -72,7 +72,7 @@ def test_what_is_written_acts_like_the_straight_lines(
     learnt = written(error, values, experiment)
     there = replace(experiment, machine=learnt.added_to(experiment.machine)).point(0, z, rounds=12)
     # Cold parts jump within the first intervals; there a derivative is that of the middle.
-    found, expected = (there.read - here.read)[4:].ravel(), (error.responses(here) @ values)[4:].ravel()
+    found, expected = (there.read - here.read)[4:].ravel(), error.combined_responses(here, values[:, None])[4:].ravel()
     sizes = np.linalg.norm(found), np.linalg.norm(expected)
     assert sizes[1] > 0.01
     assert found @ expected > 0.99 * sizes[0] * sizes[1]

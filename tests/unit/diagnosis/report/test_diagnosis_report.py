@@ -17,13 +17,13 @@ from markupsafe import escape
 
 from diagnosis.report import equation as equations
 from diagnosis.report import network_chart as drawing
-from diagnosis.report import page, write_report
 from diagnosis.report.chart import Chart, averaged, curve_points, stretches, thinned
 from diagnosis.report.course_charts import _errors, _joined, errors_over_time, measured_and_simulated, recordings_of
 from diagnosis.report.finding_charts import dates_with_bands, driver_of, heat_of_findings, names_by_grade
 from diagnosis.report.network_layout import WIDEST_ROW, places_of
-from diagnosis.report.page import PLOTLY, charts_of
+from diagnosis.report.page import PLOTLY, charts_of, page
 from diagnosis.report.wording import WORDS
+from diagnosis.report.write import write_report
 from diagnosis.results.first_screen import VERDICT_TEXT
 from diagnosis.results.number_format import NONE, fixed
 from diagnosis.results.result import Diagnosis

@@ -18,7 +18,7 @@ from diagnosis.engine.learnt import error_classes, rule
 from diagnosis.engine.refit import with_candidate
 from diagnosis.engine.unknown import NetworkParameter
 from diagnosis.proof.scoring.answers import read_answer
-from diagnosis.report import page
+from diagnosis.report.page import page
 from diagnosis.report.write import correction_of
 from diagnosis.results import predictions
 from diagnosis.results.assemble import _distinct, _remaining

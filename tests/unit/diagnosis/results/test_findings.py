@@ -9,9 +9,12 @@ import numpy as np
 import pytest
 
 from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of
-from diagnosis.results.findings import _says, switching_of
+from diagnosis.engine.fit import Fit
+from diagnosis.engine.unknown import NetworkParameter
+from diagnosis.results.findings import _says, estimates_of, switching_of
 from models.assembly.gearbox import Gearbox
 from models.mechanisms import CATALOGUE, Scale
+from models.network.laws import Parameter
 
 
 @pytest.mark.parametrize(("value", "stated", "slip"), [
@@ -33,3 +36,12 @@ def test_switch_temperatures_are_on_and_off(fzg: Gearbox) -> None:
         values |= {f"{term.label}_set_point": (70.0, 1.0), f"{term.label}_band": (6.0, 1.0)}
         found = switching_of(values, hypothesis_of(term))
         assert found is not None and (found.on_degC, found.off_degC) == (on, off), name
+
+
+def test_a_value_beyond_its_bound_keeps_an_error() -> None:
+    """A common factor that temperatures do not know may move a parameter beyond its bound."""
+    unknown = NetworkParameter(parameter=Parameter(name="f_air", sd=0.2, upper=1.1))
+    fit = SimpleNamespace(experiment=SimpleNamespace(unknowns=[unknown]), z=np.array([3.0]), covariance=np.eye(1))
+    value, error = estimates_of(cast(Fit, fit))["f_air"]
+    assert value == 1.1
+    assert error == pytest.approx(0.2 * 1.1)

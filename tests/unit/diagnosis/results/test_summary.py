@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,8 @@ import pytest
 
 from diagnosis.decision.posterior import Placebo
 from diagnosis.decision.settings import Settings
-from diagnosis.report import finding_charts, page
+from diagnosis.report import finding_charts
+from diagnosis.report.page import page
 from diagnosis.results.first_screen import EITHER, VERDICT_TEXT
 from diagnosis.results.result import Diagnosis
 from diagnosis.results.result_parts import Change, Errors, Fits, Ranked, Rival, Switching
@@ -36,6 +38,13 @@ def test_a_baseline_that_raises_the_threshold_is_told_with_it() -> None:
     assert "38.0 needed (as much as the baseline 'march' brings)" in told(raised, "Is something missing?")
     little = replace(raised, threshold=raised.further_threshold)
     assert "needed (false-alarm rate of 5 % asked for)" in told(little, "Is something missing?")
+
+
+def test_a_diagnosis_of_the_loss_alone_has_a_summary() -> None:
+    """Only losses were measured in the rows that count: no temperature has an error."""
+    nan = replace(consistent().train, before=math.nan, calibrated=math.nan, found=math.nan, after=math.nan)
+    (answer,) = dict(replace(consistent(), train=nan, holdout=nan).first_screen)["Is something missing?"]
+    assert answer.startswith("Nothing that these data show")
 
 
 def test_what_has_no_place_is_told() -> None:

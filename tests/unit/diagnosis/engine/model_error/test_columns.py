@@ -37,7 +37,11 @@ class Case:
         self.experiment = experiment
         self.point = self.simulated(experiment)
         self.error = ModelError.of(experiment)
-        self.columns = self.error.responses(self.point)
+        self.columns = self.responses(self.point)
+
+    def responses(self, point: Point, first: int = 0, last: int | None = None) -> Array:
+        """Change of what is recorded per unit of some unknowns."""
+        return self.error.combined_responses(point, np.eye(len(self.error.groups))[:, first:last])
 
     def simulated(self, experiment: Experiment) -> Point:
         return experiment.point(0, np.zeros(len(experiment.unknowns)), rounds=12)
@@ -285,14 +289,14 @@ def test_nothing_is_without_a_number(case: Case, rod: Case) -> None:
 
 def test_parts_of_the_columns(case: Case) -> None:
     """Any range gives what the whole gives, whitened or not, also at the point of a machine with one more part."""
-    some = case.error.responses(case.point, 70, 133)
+    some = case.responses(case.point, 70, 133)
     np.testing.assert_allclose(some, case.columns[:, :, 70:133], atol=1e-12)
     (part,) = case.experiment.linearise(np.zeros(len(case.experiment.unknowns))).parts
-    whitened = part.filter(case.error.responses(part.point))
+    whitened = part.filter(case.responses(part.point))
     np.testing.assert_allclose(case.error.whitened(part), whitened, atol=1e-9)
     machine = case.experiment.machine
     network = machine.model.network.with_node("tank", 500.0).with_link("tank", "oil", lambda _: 1e-9)
     starts = (np.append(case.experiment.starts[0], 30.0),)
     experiment = replace(case.experiment, machine=Machine(NetworkOnGrid(network, machine.model.losses)), starts=starts)
-    extended = case.error.responses(case.simulated(experiment), 70, 133)
+    extended = case.responses(case.simulated(experiment), 70, 133)
     np.testing.assert_allclose(extended, some, atol=1e-3 * np.abs(some).max())
