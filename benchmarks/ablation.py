@@ -21,6 +21,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from benchmarks.other_methods import read_case
 from diagnosis.decision.scanned import scan_in_classes
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import calibrate_with_error
@@ -30,10 +31,7 @@ from diagnosis.engine.learnt import ErrorClass, error_classes
 from diagnosis.engine.model_error.groups import GROUPS
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.scan import scan
-from diagnosis.proof.cases.case_files import DEFINITION
 from diagnosis.proof.scoring.truth import CONTROL, Truth, read_truths
-from diagnosis.recordings.read import read_recordings
-from models.assembly.gearbox import load_gearbox
 from models.base.parallel import iterate_parallel
 
 AS_IT_IS = "as it is"
@@ -69,11 +67,7 @@ def scan_case(folder: Path, gearbox: str) -> dict[str, Any]:
         ``case``, and for every variant ``nothing`` (log evidence of the healthy machine), ``log_e``, ``threshold`` and
         ``names`` (evidence and prior of the best candidate of each mechanism), all in nat
     """
-    definition = folder / DEFINITION
-    machine = load_gearbox(str(definition) if definition.exists() else gearbox)
-    train, held = (
-        read_recordings(sorted(folder.glob(f"{kind}_*.csv*")), machine.network()) for kind in ("train", "hold")
-    )
+    machine, train, held = read_case(folder, gearbox)
     setup, experiment = prepare_experiment(machine, train, held)
     calibration = calibrate_with_error(experiment, calibrate(experiment))
     candidates = with_priors(candidates_of(setup, experiment))

@@ -34,13 +34,15 @@ from diagnosis.engine.predict import Prediction, predict
 from diagnosis.engine.prepare import held_out_experiment, prepare_experiment
 from diagnosis.engine.scan import scan
 from diagnosis.forward.term_on_grid import TermOnGrid
+from diagnosis.proof.cases.case_files import DEFINITION
 from diagnosis.proof.scoring.lines import Task
 from diagnosis.proof.scoring.outcome import outcome
 from diagnosis.proof.scoring.truth import CONTROL, read_truths
 from diagnosis.recordings.read import read_recordings
+from diagnosis.recordings.recording import Recording
 from diagnosis.results.places import node_in
 from diagnosis.setup.inference_setup import InferenceSetup
-from models.assembly.gearbox import load_gearbox
+from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.parallel import run_parallel
 from models.base.types import Array
 from models.mechanisms import CATALOGUE
@@ -197,13 +199,19 @@ def _table(predictions: Sequence[Prediction]) -> tuple[Array, Array]:
 # ---------------------------------------------------------------------- a folder of cases
 
 
-def answers_to_files(folder: Path, gearbox: str) -> dict[str, Any]:
-    """Answers of the methods to the recordings ``train*`` and ``hold*`` of a folder, which may have a definition."""
-    own = folder / "gearbox.toml"
-    definition = load_gearbox(own if own.is_file() else gearbox)
+def read_case(folder: Path, gearbox: str) -> tuple[Gearbox, Sequence[Recording], Sequence[Recording]]:
+    """The machine of a case, with a definition of its own or that of the set, and what is learnt from and held out."""
+    own = folder / DEFINITION
+    machine = load_gearbox(own if own.is_file() else gearbox)
     train, held = (
-        read_recordings(sorted(folder.glob(f"{kind}*.csv*")), definition.network()) for kind in ("train", "hold")
+        read_recordings(sorted(folder.glob(f"{kind}_*.csv*")), machine.network()) for kind in ("train", "hold")
     )
+    return machine, train, held
+
+
+def answers_to_files(folder: Path, gearbox: str) -> dict[str, Any]:
+    """Answers of the methods to the recordings ``train_*`` and ``hold_*`` of a folder, which may have a definition."""
+    definition, train, held = read_case(folder, gearbox)
     setup, experiment = prepare_experiment(definition, train, held)
     on_even, even = prepare_experiment(definition, train, held, even=True)
     return answers_to(setup, experiment, (even, held_out_experiment(on_even, even)))

@@ -21,7 +21,6 @@ from builder.fmi.package import common_parts, package_fmu
 from builder.fmi.signals import Signal, SignalTable
 from builder.surrogate.train import TrainingResult
 from models.assembly.gearbox import Gearbox
-from models.base.errors import InputError
 from models.correction.correction import Correction
 from models.network.compiled import compile_laws, law_source
 from models.portable.evaluation import Laws
@@ -105,14 +104,11 @@ def build_python_fmu(
     Raises
     ------
     InputError
-        If the folder cannot be written to, the network has laws that are no expressions, the networks are another
-        gearbox's, or an ONNX file is missing.
+        If the folder cannot be written to, the network has laws that are no expressions, or the networks are another
+        gearbox's.
     """
     parts = common_parts(gearbox, training, output, network=network, correction=correction, flags=FLAGS, kind="python")
     onnx = {path.name: path.read_bytes() for path in networks}
-    missing = {f"{one.name}.onnx" for one in parts.losses.networks} - onnx.keys() if parts.losses else ()
-    if missing:
-        raise InputError(f"the ONNX files {', '.join(sorted(missing))} are missing; export the networks again")
     code = python_code(parts.table, parts.network, parts.losses, onnx)
     digest = hashlib.sha256(json.dumps(code, sort_keys=True).encode()).hexdigest()
     xml = model_description(parts.table, parts.identity, content=digest.encode())

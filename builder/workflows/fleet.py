@@ -211,7 +211,7 @@ def diagnose_fleet(
                 show("diagnosing the fleet", len(outcomes), len(members))
         except InputError:
             raise
-        except Exception as error:  # noqa: BLE001 - a worker that dies takes only its own gearbox along
+        except Exception as error:  # noqa: BLE001 - a worker that dies takes along what is not done yet
             for member in members:
                 outcomes.setdefault(member.name, _without_diagnosis(member.name, error))
         rows = [outcomes[member.name].row for member in members]

@@ -7,6 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from diagnosis.proof.cases.case_files import case_names
 from diagnosis.proof.cases.conceal import conceal_set, draw_case, mix_of, mixed_plans
 from diagnosis.proof.scoring.lines import Settings
 from models.assembly.gearbox import Gearbox, load_gearbox
@@ -51,7 +52,7 @@ def make_cases(settings: Settings, recordings: Path, truth: Path, jobs: int, pro
     """
     if settings.plant == "given":
         return {}
-    names = [f"case_{i:0{max(3, len(str(settings.cases)))}d}" for i in range(1, settings.cases + 1)]
+    names = case_names(settings.cases)
     # The truth of a case is written after its recordings.
     missing = [name for name in names if not (truth / f"{name}.json").exists()]
     if settings.plant == "zoo":

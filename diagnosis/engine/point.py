@@ -164,7 +164,7 @@ class Point:
 
     @property
     def machine(self) -> Machine:
-        """What is simulated."""
+        """The machine that is simulated."""
         return self.setting.machine
 
     @property

@@ -40,7 +40,7 @@ from pydantic import Field, field_validator, model_validator
 
 from models.base.errors import InputError, did_you_mean
 from models.definition.messages import validate_section
-from models.definition.sections import Name, Section, Text
+from models.definition.sections import Name, NotNegative, Positive, Section, Text
 from models.files import toml_file
 from models.files.table_file import UTF_8, TextForm
 from models.quantities.quantities import SENSOR, Quantity, quantity_of
@@ -54,9 +54,6 @@ CLOCK_TIME = "hh:mm:ss"  # unit of times since the start, or of day, as 13:05:00
 TIME_UNITS = ("s", "ms", "us", "ns", "min", "h", "d", "iso8601", CLOCK_TIME)
 AUXILIARY, IGNORE = "auxiliary", "ignore"  # roles of columns that are no quantity
 KELVIN = (200.0, 600.0)  # no gearbox has such temperatures in degC all the time
-
-Positive = Annotated[float, Field(gt=0.0, le=1e9)]
-NotNegative = Annotated[float, Field(ge=0.0, le=1e9)]
 
 
 class Column(Section):

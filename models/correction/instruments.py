@@ -24,13 +24,11 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from models.base.errors import did_you_mean
-from models.definition.sections import Name, Section
+from models.definition.sections import Name, NotNegative, Positive, Section
 from models.quantities.quantities import TOTAL_LOSS, is_total_loss, node_of_channel
 
 AIR = "air"  # the surroundings, for a machine whose network has no such node
-NotNegative = Annotated[float, Field(ge=0.0, le=1e9)]
 Number = Annotated[float, Field(ge=-1e9, le=1e9)]
-Positive = Annotated[float, Field(gt=0.0, le=1e9)]
 
 
 class Mix(Section):

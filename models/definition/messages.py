@@ -20,12 +20,10 @@ S = TypeVar("S", bound=Section)
 EXPECTED = {
     "float_type": "a number",
     "int_type": "a whole number",
-    "int_from_float": "a whole number",
     "string_type": "a text",
     "bool_type": "true or false",
     "tuple_type": "a list",
     "model_type": "a table",
-    "model_attributes_type": "a table",
     "dict_type": "a table",
 }
 MESSAGES = {
@@ -33,7 +31,6 @@ MESSAGES = {
     "finite_number": "must be finite, not {given}",
     "string_pattern_mismatch": "{given} must be a name of letters, digits and underscores that begins with a letter",
     "too_long": "has too many entries",
-    "too_short": "has too few entries",
     **{kind: f"must be {expected}, not {{given}}" for kind, expected in EXPECTED.items()},
 }
 NAMES = ("name", "label")  # keys that name the entries of lists

@@ -33,6 +33,8 @@ def _at_least_one(entries: tuple[T, ...]) -> tuple[T, ...]:
 
 
 OneOrMore = Annotated[tuple[T, ...], AfterValidator(_at_least_one)]
+Positive = Annotated[float, Field(gt=0.0, le=1e9)]
+NotNegative = Annotated[float, Field(ge=0.0, le=1e9)]
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
 Text = Annotated[str, StringConstraints(min_length=1)]
 # A whole number of hundreds of digits, which no float holds, is refused before anything is calculated with it.

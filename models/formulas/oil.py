@@ -356,7 +356,7 @@ class Oil:
         References
         ----------
         Arana et al. 2019, eqs. (23) and (35); the series is derived here and checked against the integral
-        (``tests/unit/test_oil.py``).
+        (``tests/unit/models/formulas/test_oil.py``).
 
         Examples
         --------

@@ -206,10 +206,7 @@ class MeshContact:
         highest = T_in + rise * (xi * self.mu_solid + (1.0 - xi) * limit)
         T_film = decreasing_root(lambda T: T_in + rise * friction(T) - T, T_in, highest, f_tol=FILM_TEMPERATURE_TOL)
         mu = friction(T_film)
-        return ContactState(
-            F=inlet.F, p_H=inlet.p_H, V_s=V_s, V_r=inlet.V_r, h=h, phi_T=inlet.phi_T, asperity_share=xi, T_in=T_in,
-            T_film=T_film, residual=T_in + rise * mu - T_film, mu=mu,
-        )  # fmt: skip
+        return ContactState(**vars(inlet), asperity_share=xi, T_film=T_film, residual=T_in + rise * mu - T_film, mu=mu)
 
     def loss(self, *, omega_1: Array, torque: Array, T_1: Array, T_2: Array) -> tuple[Array, Array]:
         """Mean sliding and rolling loss of the mesh; parameters as :meth:`solve`.
@@ -219,7 +216,7 @@ class MeshContact:
         sliding, rolling : Array, shape (N,)
             [W]
         """
-        state: Inlet | ContactState
+        state: Inlet
         if self.friction == "schlenk":  # needs no film temperature
             state = self._inlet(omega_1=omega_1, torque=torque, T_1=T_1, T_2=T_2)
             # ISO/TR 14179-2 takes the oil sump's viscosity; the network knows the nearer one of the contact's inlet.
@@ -315,31 +312,18 @@ class Inlet:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ContactState:
+class ContactState(Inlet):
     """State of the contact points; every field of shape (N, n_points).
 
     Attributes
     ----------
-    F, p_H : Array
-        Normal force [N], Hertz pressure [Pa]
-    V_s, V_r : Array
-        Sliding speed and sum of the surface speeds, [m/s]
-    h, phi_T : Array
-        Central film thickness [m], thermal reduction included in it [-]
     asperity_share, mu : Array
         Share of the load on asperities, friction coefficient, [-]
-    T_in, T_film, residual : Array
-        Inlet and film temperature [degC], residual of the film temperature's equation [K]
+    T_film, residual : Array
+        Film temperature [degC], residual of its equation [K]
     """
 
-    F: Array
-    p_H: Array
-    V_s: Array
-    V_r: Array
-    h: Array
-    phi_T: Array
     asperity_share: Array
-    T_in: Array
     T_film: Array
     residual: Array
     mu: Array

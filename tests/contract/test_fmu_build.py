@@ -15,14 +15,6 @@ from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.errors import InputError
 
 
-def test_without_an_onnx_file_a_build_leaves_no_file(
-    fzg: Gearbox, fzg_training: TrainingResult, tmp_path: Path
-) -> None:
-    with pytest.raises(InputError, match=r"mesh\.onnx"):
-        build_python_fmu(fzg, fzg_training, [], tmp_path / "fzg.fmu")
-    assert list(tmp_path.iterdir()) == []
-
-
 @pytest.mark.parametrize("build", [partial(build_python_fmu, networks=()), partial(build_native_fmu, platforms="host")])
 @pytest.mark.parametrize("other", ["conveyor", "heated_rod"])
 def test_networks_of_another_gearbox_leave_no_file(

@@ -5,33 +5,21 @@ from __future__ import annotations
 import gzip
 import json
 import shutil
-import sys
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from builder.__main__ import main
 from builder.workflows import fleet
 from builder.workflows.fleet import members_of
 from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError
 from models.files.cycle import Cycle
+from tests.conftest import RunCli
 
 SENSORS = ("oil", "housing_lower", "bearing_1")
 REPORT = {"report.html", "diagnosis.json", "correction.toml", "posterior.npz", "train.csv"}
-
-
-def run(*arguments: object) -> int:
-    """Run the command line in this process and return its exit status."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "argv", ["builder", *map(str, arguments)])
-        try:
-            main()
-        except SystemExit as end:
-            return int(end.code or 0)
-    return 0
 
 
 def recorded(gearbox: Gearbox, *, seed: int, hours: float, bias: float = 0.0) -> pd.DataFrame:
@@ -68,10 +56,10 @@ def folder(fzg: Gearbox, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def diagnosed(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, int]:
+def diagnosed(folder: Path, tmp_path_factory: pytest.TempPathFactory, run_cli: RunCli) -> tuple[Path, int]:
     """Output and exit status."""
     out = tmp_path_factory.mktemp("out") / "fleet"
-    return out, run("diagnose", folder, "--fleet", "--jobs", 2, "--output", out)
+    return out, run_cli("diagnose", folder, "--fleet", "--jobs", 2, "--output", out)
 
 
 def test_baselines_lie_in_the_folder_of_a_gearbox(tmp_path: Path) -> None:
@@ -114,20 +102,22 @@ def test_recordings_of_one_name_get_a_prediction_each(diagnosed: tuple[Path, int
 
 
 @pytest.mark.slow
-def test_several_processes_give_the_bytes_of_one(diagnosed: tuple[Path, int], folder: Path, tmp_path: Path) -> None:
+def test_several_processes_give_the_bytes_of_one(
+    diagnosed: tuple[Path, int], folder: Path, tmp_path: Path, run_cli: RunCli
+) -> None:
     """Each of a fleet is diagnosed by one process."""
     learnt, held = folder / "biased/train.csv", folder / "biased/holdout"
-    assert run("diagnose", learnt, "--holdout", held / "train.csv", "--jobs", 2, "--output", tmp_path) == 0
+    assert run_cli("diagnose", learnt, "--holdout", held / "train.csv", "--jobs", 2, "--output", tmp_path) == 0
     ours = json.loads((diagnosed[0] / "biased/diagnosis.json").read_text())
     assert json.loads((tmp_path / "diagnosis.json").read_text()) == ours
 
 
 def test_the_table_is_shown_and_the_faults_are_told(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], run_cli: RunCli
 ) -> None:
     for name in ("broken", "empty"):
         shutil.copytree(folder / name, tmp_path / "fleet" / name)
-    assert run("diagnose", tmp_path / "fleet", "--fleet", "--output", tmp_path / "out") == 2
+    assert run_cli("diagnose", tmp_path / "fleet", "--fleet", "--output", tmp_path / "out") == 2
     shown = capsys.readouterr()
     assert "verdict" in shown.out
     assert "2 of 2 gearboxes could not be diagnosed" in shown.err
@@ -137,30 +127,30 @@ def test_the_table_is_shown_and_the_faults_are_told(
 
 
 def test_what_no_diagnosis_wrote_is_not_replaced(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], run_cli: RunCli
 ) -> None:
     shutil.copytree(folder / "sound", tmp_path / "fleet/sound")
     out, report = tmp_path / "out", tmp_path / "out/sound/report.html"
     report.parent.mkdir(parents=True)
     report.write_text("my own")
-    assert run("diagnose", tmp_path / "fleet", "--fleet", "--output", out) == 2
+    assert run_cli("diagnose", tmp_path / "fleet", "--fleet", "--output", out) == 2
     assert "report.html: exists, and no diagnosis wrote it" in capsys.readouterr().err
     assert report.read_text() == "my own" and pd.read_csv(out / "summary.csv").loc[0, "verdict"] == "error"
-    assert run("diagnose", tmp_path / "fleet", "--fleet", "--output", out) == 2  # its own table is replaced
+    assert run_cli("diagnose", tmp_path / "fleet", "--fleet", "--output", out) == 2  # its own table is replaced
     (out / "summary.csv").write_text("mine\n")
-    assert run("diagnose", tmp_path / "fleet", "--fleet", "--output", out) == 2
+    assert run_cli("diagnose", tmp_path / "fleet", "--fleet", "--output", out) == 2
     assert "summary.csv: exists, and no fleet wrote it; choose another --output" in capsys.readouterr().err
     assert (out / "summary.csv").read_text() == "mine\n"
 
 
 def test_our_own_fault_with_one_leaves_the_others_and_ends_with_status_1(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, run_cli: RunCli
 ) -> None:
     def breaks(*_: object, **__: object) -> None:
         raise ZeroDivisionError("by chance")
 
     monkeypatch.setattr(fleet, "diagnose", breaks)
-    assert run("diagnose", folder, "--fleet", "--jobs", 1, "--output", tmp_path / "out") == 1
+    assert run_cli("diagnose", folder, "--fleet", "--jobs", 1, "--output", tmp_path / "out") == 1
     assert "ZeroDivisionError: by chance" in capsys.readouterr().err
     errors = pd.read_csv(tmp_path / "out/summary.csv").set_index("gearbox")["error"]
     assert errors["sound"] == "a fault of this program: ZeroDivisionError: by chance"
@@ -168,7 +158,9 @@ def test_our_own_fault_with_one_leaves_the_others_and_ends_with_status_1(
 
 
 @pytest.mark.slow
-def test_a_cluster_gives_the_same_reports(diagnosed: tuple[Path, int], folder: Path, tmp_path: Path) -> None:
+def test_a_cluster_gives_the_same_reports(
+    diagnosed: tuple[Path, int], folder: Path, tmp_path: Path, run_cli: RunCli
+) -> None:
     distributed = pytest.importorskip("distributed", reason="the extra 'dask' is not installed")
     for name in ("broken", "biased"):
         shutil.copytree(folder / name, tmp_path / "fleet" / name)
@@ -176,7 +168,7 @@ def test_a_cluster_gives_the_same_reports(diagnosed: tuple[Path, int], folder: P
         n_workers=1, threads_per_worker=1, processes=True, protocol="tcp", dashboard_address=None
     ) as cluster:
         address = cluster.scheduler_address
-        assert run("diagnose", tmp_path / "fleet", "--fleet", "--dask", address, "--output", tmp_path / "out") == 2
+        assert run_cli("diagnose", tmp_path / "fleet", "--fleet", "--dask", address, "--output", tmp_path / "out") == 2
     ours, theirs = diagnosed[0], tmp_path / "out"
     for name in sorted(p.name for p in (ours / "biased").iterdir()):
         assert (theirs / "biased" / name).read_bytes() == (ours / "biased" / name).read_bytes(), name
@@ -200,11 +192,11 @@ FAULTY = [
 @pytest.mark.parametrize(("arguments", "message"), FAULTY, ids=[message for _, message in FAULTY])
 def test_faulty_options_end_with_status_2_and_leave_nothing(
     arguments: list[str], message: str, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch: pytest.MonkeyPatch, run_cli: RunCli,
 ) -> None:  # fmt: skip
     monkeypatch.setattr("models.base.parallel.CONNECT_S", 1.0)
     given = [a.replace("FOLDER", str(folder)) for a in arguments]
-    assert run("diagnose", *given, "--output", tmp_path / "out") == 2
+    assert run_cli("diagnose", *given, "--output", tmp_path / "out") == 2
     shown = capsys.readouterr().err
     assert message in " ".join(shown.split())
     assert "Traceback" not in shown

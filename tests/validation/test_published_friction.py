@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 
 from models.assembly.gearbox import Gearbox, load_gearbox
-from models.definition.named_oils import lubricant, named_oil
 from models.formulas.load_sharing import contact_points, load_sharing_loss_factor
 from models.losses.friction import friction_schlenk
 
@@ -133,19 +132,3 @@ def test_whole_model_reproduces_c14() -> None:
     T_case = float(np.interp(-case.eta_mPas * 1e-3, -eta, T))
     sliding = losses.breakdown(speed=case.n_1, torque=case.T_1, temperatures=T_case)["mesh_sliding"]
     assert sliding == pytest.approx(case.P_VZP, rel=5e-4)
-
-
-# FEUP, kinematic viscosity [mm^2/s] at 40, 60, 80, 90, 100 degC from ASTM D341 with 0.7; printed with two decimals.
-PORTO = {
-    "MINR": (316.0, 103.25, 43.68, 30.56, 22.23),
-    "PAOR": (311.56, 124.98, 60.18, 44.06, 33.23),
-    "ESTR": (299.64, 117.6, 55.86, 40.71, 30.59),
-    "PAGD": (287.34, 141.46, 78.55, 60.72, 47.92),
-    "P150": (148.94, 64.52, 33.15, 24.97, 19.33),
-}
-
-
-@pytest.mark.parametrize("name", PORTO)
-def test_porto_viscosities(name: str) -> None:
-    ours = lubricant(named_oil(name)).kinematic_viscosity(np.array([40.0, 60.0, 80.0, 90.0, 100.0]))
-    assert ours == pytest.approx(PORTO[name], abs=5.1e-3, rel=2e-4)

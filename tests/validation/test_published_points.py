@@ -80,7 +80,10 @@ POINTS = [
       for T, alpha in ((40.0, 16.1), (60.0, 14.5), (90.0, 12.9))),
     Point(lambda: oil.modulus_scale(96.0, 32.63), {}, 1.162, "modulus equation", 0.0, 5e-4),
     Point(lambda: oil.modulus_scale(50.0, 50.0), {}, 1.0, "modulus equation"),
+    Point(lambda: 1e9 * np.asarray(OIL.pressure_viscosity_coefficient(60.0, 1e9)), {}, 11.76, INDEPENDENT, 0.0, 5.1e-3),
     # Line contact
+    Point(lambda: 1e6 * ehl.hertz_line(F / PAIR.b, PAIR.rho_red_C, E_RED)[0], {}, 199.5, INDEPENDENT, 0.0, 0.051),
+    Point(lambda: 1e-6 * ehl.hertz_line(F / PAIR.b, PAIR.rho_red_C, E_RED)[1], {}, 1347.0, INDEPENDENT, 0.0, 0.51),
     Point(ehl.film_hamrock_dowson, CONTACT | {"F": F}, 0.163e-6, INDEPENDENT, 0.0, 5e-10),
     Point(ehl.film_dowson_toyoda, CONTACT | {"w": F / PAIR.b}, 0.197e-6, INDEPENDENT, 0.0, 5e-10),
     Point(ehl.film_grubin, CONTACT | {"w": F / PAIR.b}, 0.180e-6, INDEPENDENT, 0.0, 5e-10),
@@ -121,11 +124,16 @@ POINTS = [
     Point(lambda: bearing.oil_flow_max(90.0, 23.0), {}, 0.1656, "SKF, table", 0.0, 5e-5),
     Point(lambda: bearing.heat_dissipation_reference(30.0, 90.0, 23.0), {}, 2.775, "SKF, table", 0.0, 5e-4),
     # Churning
+    Point(lambda: sum(churning.churning_niemann(e=r - 19e-3, b=PAIR.b, v_t=8.3) for r in PAIR.r_a), {}, 7.68,
+          INDEPENDENT, 5e-3),
     Point(churning.churning_mauz, {"e": (22.226e-3, 40.181e-3), "b": 14e-3, "v_t": 8.3, "omega_2": 1.0}, 0.5394,
           "Mauz, by hand: C1 = 0.4283, C2 = 0.278", 0.0, 2e-4),
     Point(churning.churning_changenet_velex, GEAR | {"omega": 20.0}, changenet(True, 20.0), "Changenet, laminar"),
     Point(churning.churning_changenet_velex, GEAR | {"omega": 1e3}, changenet(False, 1e3), "Changenet, turbulent"),
     # Seals
+    *(Point(lambda c: sum(seal.seal_loss_linke(d_mm=d, n_rpm=n, T_oil=60.0, nu_40=32.0, c_T=c)
+                          for d, n in ((24.0, 2165.7), (54.0, 1443.8))), {"c": c}, watts, INDEPENDENT, 0.0, 5.1e-3)
+      for c, watts in ((1.6, 61.25), (1.0, 80.90))),
     Point(seal.seal_loss_linke, {"d_mm": 24.0, "n_rpm": 1000.0, "T_oil": 60.0, "nu_40": 32.0}, 6.465,
           "Linke, by hand: (145 - 96 + 350 lg lg 32.8) 24^2 1000 1e-7", 0.0, 5e-4),
     Point(seal.seal_loss_linke, {"d_mm": 24.0, "n_rpm": 1000.0, "T_oil": 300.0, "nu_40": 32.0},

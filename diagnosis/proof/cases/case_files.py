@@ -21,6 +21,18 @@ OF_AIR = ("T_ambient", "T_outdoor")  # temperatures that are inputs
 DECIMALS = {"time_s": 0, "speed_rpm": 1, "torque_Nm": 2}
 
 
+def case_names(number: int) -> list[str]:
+    """Names of so many cases, in an order that is that of the alphabet.
+
+    Examples
+    --------
+    >>> case_names(2)
+    ['case_001', 'case_002']
+    """
+    digits = max(3, len(str(number)))
+    return [f"case_{i:0{digits}d}" for i in range(1, number + 1)]
+
+
 @contextmanager
 def staged_folders(recordings: Path, truth: Path) -> Iterator[tuple[Path, Path]]:
     """Folders to write cases into; both replace those named when all is done, or nothing changes.

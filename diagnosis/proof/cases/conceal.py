@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from diagnosis.proof.cases.case_files import staged_folders, write_case
+from diagnosis.proof.cases.case_files import case_names, staged_folders, write_case
 from diagnosis.proof.cases.concealed_case import CONTROLS, FAULTS, ConcealedCase, Plan
 from diagnosis.proof.cases.truth import truth_of
 from diagnosis.proof.plant.cycles import Programme, ambient, ornstein_uhlenbeck, programmes
@@ -201,8 +201,8 @@ def conceal_set(
         If an effect is not known, or a folder cannot be written to.
     """
     plant = Plant(gearbox)
-    digits = max(3, len(str(len(plans))))
-    cases = [draw_case(plant, plan, seed=(seed, i), name=f"case_{i + 1:0{digits}d}") for i, plan in enumerate(plans)]
+    cases = [draw_case(plant, plan, seed=(seed, i), name=name)
+             for i, (plan, name) in enumerate(zip(plans, case_names(len(plans)), strict=True))]  # fmt: skip
     for first in range(0, len(cases), TOGETHER):
         batch = cases[first : first + TOGETHER]
         runs = [replace(run, effects=kept) for case in batch for kept in twins(case) for run in case.runs]

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.proof.cases.case_files import write_files
+from diagnosis.proof.cases.case_files import case_names, write_files
 from diagnosis.proof.cases.time_course import FORMS, Form
 from diagnosis.proof.cases.truth import size_of, size_of_heat
 from diagnosis.proof.injection.calibrated_model import CalibratedModel, calibrate
@@ -226,9 +226,8 @@ def inject_set(
         If the wish cannot be fulfilled, or something cannot be written.
     """
     injector.check(wish)
-    names = []
-    for k in range(number):
-        name = f"case_{k + 1:03d}"
+    names = case_names(number)
+    for k, name in enumerate(names):
         folder = recordings if flat else recordings / name
         rng = np.random.default_rng([seed, k])
         found = None if wish.control else injector.draw(wish, rng)

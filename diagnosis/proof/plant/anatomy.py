@@ -43,7 +43,8 @@ class Path:
     factor : str or None
         The definition's tunable factor that it takes
     law : str
-        How it depends on the operating point: ``fixed``, ``oil``, ``air``, ``teeth``, ``faces``, ``exchange``, ``mesh``
+        How it depends on the operating point: ``fixed``, ``oil``, ``air``, ``teeth_0`` and ``faces_0`` (of gear 0),
+        ``exchange``, ``mesh``
     """
 
     name: str

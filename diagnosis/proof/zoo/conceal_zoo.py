@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from diagnosis.proof.cases.case_files import write_case
+from diagnosis.proof.cases.case_files import case_names, write_case
 from diagnosis.proof.cases.conceal import drawn_counts
 from diagnosis.proof.zoo.case import BASELINE, CONTROLS, GROUPS, ZooCase, ZooPlan
 from diagnosis.proof.zoo.draw import draw_case
@@ -112,14 +112,12 @@ def conceal_zoo(
     InputError
         If a definition cannot be split, or a folder cannot be written to.
     """
-    digits, names = max(3, len(str(len(plans)))), []
-    for i, plan in enumerate(plans):
-        name = f"case_{i + 1:0{digits}d}"
+    names = case_names(len(plans))
+    for done, (name, plan) in enumerate(zip(names, plans, strict=True), start=1):
         case = draw_case(plan, name=name, baselines=baselines, session_deviation=session_deviation)
         write_zoo_case(case, recordings if flat else recordings / case.name, truth / f"{case.name}.json")
-        names.append(case.name)
         if progress is not None:
-            progress(i + 1, len(plans))
+            progress(done, len(plans))
     return names
 
 

@@ -1,4 +1,4 @@
-"""Published loss formulas that the nominal model of a diagnosis does not use, for arrays of any shape.
+"""Published loss formulas, written again without the code of the nominal model, for arrays of any shape.
 
 Speeds may be zero; temperatures are degC, everything else SI unless a name has another unit.
 """

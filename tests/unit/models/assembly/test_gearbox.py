@@ -251,6 +251,8 @@ def test_another_oil_is_another_oil_in_all_that_follows_from_its_name(fzg: Gearb
     assert other.source_of("oil.density_kg_m3") != fzg.source_of("oil.density_kg_m3")
     with pytest.raises(InputError, match="there is no oil named 'VG'"):
         fzg.with_values({"oil.named": "VG"})
+    with pytest.raises(InputError, match="oil: 'named' is not a known key"):  # without geometry an oil has no name
+        load_gearbox("reducer").with_values({"oil.named": "ISO_VG_220"})
 
 
 def test_another_designation_changes_the_bearing(fzg: Gearbox) -> None:
