@@ -148,7 +148,6 @@ def assemble(
         log_e_value=posterior.evidence,
         threshold=posterior.needed,
         further_threshold=posterior.class_threshold,
-        p_value=_bound_on_chance(posterior.evidence),
         location=location,
         findings=findings,
         calibration=model.calibration,
@@ -165,7 +164,7 @@ def assemble(
         noise_K=setup.noise_K,
         floor=_floor(setup, calibration.near.experiment.random_heat),
         misfit=_misfit(final),
-        remaining_p_value=1.0 if _looked_no_further(best) else _bound_on_chance(posterior.left_by(best)),
+        remaining_nat=0.0 if _looked_no_further(best) else posterior.left_by(best),
         remaining_note=_remaining(posterior, others, best) + left_out,
         ranking=_ranking(posterior),
         unseen=unseen,
@@ -221,11 +220,6 @@ def _notes_of_recordings(setup: InferenceSetup) -> Iterator[str]:
     yield from too_short(setup.holdout, setup.held_out)
     for recording in (*setup.recordings, *setup.holdout, *setup.baseline):
         yield from (f"{recording.name}: {note}" for note in recording.notes)
-
-
-def _bound_on_chance(nats: float) -> float:
-    """Bound on the chance of such evidence if the model were exact."""
-    return float(min(1.0, np.exp(-max(nats, -50.0))))
 
 
 def faulty_channels(posterior: Posterior, apart: Sequence[str]) -> tuple[str, ...]:

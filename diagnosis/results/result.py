@@ -48,6 +48,10 @@ Verdict = Literal[
 ]
 
 
+def _bound_on_chance(nats: float) -> float:
+    return math.exp(-max(nats, 0.0))
+
+
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Diagnosis:
     """The result of :func:`diagnosis.diagnose`.
@@ -56,11 +60,9 @@ class Diagnosis:
     ----------
     verdict : str
     gearbox : str
-    log_e_value, threshold, p_value : float
-        Log odds of all effects to a machine without one, parameters as they may be [nat], the level it had to reach,
-        and exp(-evidence), at most 1. That would bound the chance of such evidence in a healthy machine only if the
-        model were exact, which it never is; the threshold decides. With the verdict ``parameter_error``: evidence that
-        a parameter is outside its prior
+    log_e_value, threshold : float
+        Log odds of all effects to a machine without one, parameters as they may be, and the level it had to reach,
+        [nat]. With the verdict ``parameter_error``: evidence that a parameter is outside its prior
     further_threshold : float
         From which a further effect counts, [nat]
     location : tuple of Location
@@ -75,8 +77,8 @@ class Diagnosis:
     misfit : float
         Mean square of the residual of the model that predicts in the training recordings, in multiples of what noise
         and random heat make of it
-    remaining_p_value : float
-        exp(-evidence) of a further effect, at most 1, as `p_value`; 1 where no further look was taken
+    remaining_nat : float
+        Evidence of a further effect, [nat]; 0 where no further look was taken
     remaining_note : str
     ranking : tuple of Ranked
     unseen : tuple of NotDetectable
@@ -142,7 +144,6 @@ class Diagnosis:
     log_e_value: float
     threshold: float
     further_threshold: float
-    p_value: float
     location: tuple[Location, ...]
     findings: tuple[Finding, ...]
     calibration: tuple[Calibrated, ...]
@@ -151,7 +152,7 @@ class Diagnosis:
     noise_K: float
     floor: str
     misfit: float
-    remaining_p_value: float
+    remaining_nat: float
     remaining_note: str
     ranking: tuple[Ranked, ...]
     unseen: tuple[NotDetectable, ...]
@@ -230,7 +231,7 @@ class Diagnosis:
             "sessions": {"deviation_in_sd": self.session_s, "repeating": [asdict(one) for one in self.repeating],
                          "placebo": None if self.placebo is None else asdict(self.placebo)},
             "remaining": {
-                "p_value": or_none(self.remaining_p_value),
+                "p_value": _bound_on_chance(self.remaining_nat),
                 "note": self.remaining_note,
                 "misfit": or_none(self.misfit),
             },
@@ -279,9 +280,17 @@ class Diagnosis:
         return tuple(tuple(finding for finding in self.findings if finding.item == one) for one in items)
 
     @property
+    def p_value(self) -> float:
+        """exp(-evidence), at most 1: a bound on the chance of it in a healthy machine if the model were exact.
+
+        It never is; the threshold decides.
+        """
+        return _bound_on_chance(self.log_e_value)
+
+    @property
     def further_helps(self) -> bool:
         """True if the recordings give evidence of a further effect; without, its probability is only a prior one."""
-        return self.remaining_p_value < math.exp(-self.further_threshold)
+        return self.remaining_nat > self.further_threshold
 
     @property
     def nearest(self) -> tuple[Ranked, ...]:

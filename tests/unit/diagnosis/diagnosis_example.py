@@ -52,7 +52,6 @@ def missing_physics() -> Diagnosis:
     return _diagnosis(
         verdict="missing_physics",
         log_e_value=41.3,
-        p_value=1.2e-18,
         findings=(windage,),
         location=(
             Location(nodes=("oil",), probability=0.962, heat_mean_W=21.0, heat_max_W=66.0,
@@ -64,7 +63,7 @@ def missing_physics() -> Diagnosis:
         courses=tuple(_course(name, lacking=6.0) for name in RECORDINGS),
         train=_fits(4.13, 2.98, 0.41),
         holdout=_fits(5.21, 3.62, 0.52),
-        remaining_p_value=0.41,
+        remaining_nat=0.9,
         remaining_note="Nothing that these recordings could show remains.",
         next_test="Hold 20 m/s without load at two oil temperatures that lie 30 K apart.",
         ranking=_ranking(("windage", "oil", 0.914), ("pocketing", "oil", 0.061), ("churning_swirl", "oil", 0.019)),
@@ -109,11 +108,10 @@ def consistent() -> Diagnosis:
     return _diagnosis(
         verdict="consistent",
         log_e_value=-0.8,
-        p_value=1.0,
         courses=tuple(_course(name, lacking=0.3) for name in RECORDINGS),
         train=_fits(0.92, 0.31, 0.31),
         holdout=_fits(1.02, 0.38, 0.38),
-        remaining_p_value=0.62,
+        remaining_nat=0.5,
         remaining_note="Nothing remains.",
         ranking=_ranking(("pump_heat", "oil", 0.04), ("aeration", "oil_gears", 0.02)),
     )
@@ -131,7 +129,7 @@ def unexplained() -> Diagnosis:
     place = replace(base.location[0], nodes=("housing_lower",), probability=0.83, regime="no regime of speed or torque")
     return replace(
         base, verdict="unexplained", findings=(heat,), location=(place,),
-        train=_fits(4.1, 3.0, 1.9), holdout=_fits(5.2, 3.6, 3.1), misfit=2.7, remaining_p_value=0.001,
+        train=_fits(4.1, 3.0, 1.9), holdout=_fits(5.2, 3.6, 3.1), misfit=2.7, remaining_nat=6.9,
         remaining_note="Heat in the lower housing whose cause is not in the catalogue.",
     )  # fmt: skip
 
@@ -142,11 +140,10 @@ def insufficient_data() -> Diagnosis:
     return _diagnosis(
         verdict="insufficient_data",
         log_e_value=0.1,
-        p_value=0.9,
         courses=(_course("short", lacking=0.2, duration=600.0, held_out=False),),
         train=_fits(0.4, 0.21, 0.21),
         holdout=Fits(before=nothing, calibrated=nothing, found=nothing, after=nothing, sensors={}, recordings={}),
-        remaining_p_value=nothing,
+        remaining_nat=0.0,
         remaining_note="",
         ranking=(),
         unseen=tuple(

@@ -306,7 +306,7 @@ def test_a_name_that_only_comes_with_another_is_shown_if_the_data_ask_for_more()
     rivals = (finding.confusable_with[0], replace(finding.confusable_with[1], instead=False))
     base = replace(missing_physics(), findings=(replace(finding, confusable_with=rivals),))
     assert "May act as well" not in page(base) and "churning swirl" not in names_by_grade(base).alt  # type: ignore[union-attr]
-    asked = replace(base, remaining_p_value=1e-6)
+    asked = replace(base, remaining_nat=14.0)
     assert "May act as well" in page(asked) and "churning swirl" in names_by_grade(asked).alt  # type: ignore[union-attr]
 
 
