@@ -38,13 +38,16 @@ class Axis:
     dates : Array, shape (n,)
         At which something may change, [s]
     end : float
-        End of the last recording, [s]
+        End of the last recording learnt from, [s]
+    until : float
+        End of the last of all, held-out ones too, [s]: how what grows goes on after it nobody has measured
     edge_s : float
         Shortest time that a change takes, [s]
     """
 
     dates: Array
     end: float
+    until: float
     edge_s: float = 2.0 * EDGE_S
 
     @property
@@ -145,7 +148,7 @@ def in_times(spans: Sequence[tuple[float, float]]) -> DatedCourse:
 
 
 def over_hours(axis: Axis) -> DatedCourse:
-    """Slowly over the hours since the first row of the first recording: on and on, or until it has settled."""
+    """Slowly over the hours since the first row of the first recording: to the end of the last, or until it settles."""
     names = ("linear", "settling", "fading")
     linear, settling, fading = (symbol(name) for name in names)
     parameters = tuple(
@@ -154,7 +157,7 @@ def over_hours(axis: Axis) -> DatedCourse:
     decay = sp.exp(-NOW / SETTLING_S)
     return DatedCourse(
         ending=HOURS, how="over_hours", sentence="Slowly over the hours", parameters=parameters, variants=np.eye(3),
-        law=linear * NOW / max(LINEAR_S, axis.end) + settling * (1 - decay) + fading * decay,
+        law=linear * Min(NOW, axis.until) / max(LINEAR_S, axis.end) + settling * (1 - decay) + fading * decay,
     )  # fmt: skip
 
 

@@ -10,6 +10,7 @@ import sympy as sp
 from diagnosis.candidates.dated import LINEAR_S, SETTLING_S, Axis
 from diagnosis.candidates.hypotheses import Hypothesis
 from models.base.types import Array
+from models.formulas.extremes import Min
 from models.mechanisms import OPEN_FORM, Scale
 from models.mechanisms.scale import TYPICAL_RISE
 from models.network.laws import Parameter, symbol
@@ -73,7 +74,7 @@ def _unknown(network: ThermalNetwork, scale: Scale, axis: Axis, node: str, is_lo
     name = "unknown_loss" if is_loss else "unknown_heat"
     label = f"{name}_{node}"
     clock = axis.clock(label)
-    functions = _functions(network, scale, node, symbol("time") + symbol(clock.name))
+    functions = _functions(network, scale, node, Min(symbol("time") + symbol(clock.name), axis.until))
     size = SHARE * (scale.loss or scale.conductance * TYPICAL_RISE)
     strength = Parameter(name=f"{label}_strength", unit="W", start=0.0, sd=size, lower=-100.0 * size,
                          upper=100.0 * size, log=False)  # fmt: skip

@@ -135,7 +135,8 @@ def axis_of(experiment: Experiment) -> Axis:
             dates += [middle] if name == names[0] else [start, middle]
     end = max(experiment.starts_at.get(name, 0.0) + float(of_recording[name][-1].time[-1]) for name in names)
     interval = float(np.median(np.concatenate([piece.steps for piece in experiment.pieces])))
-    return Axis(dates=np.array(sorted(dates)), end=end, edge_s=2.0 * max(EDGE_S, interval if experiment.slow else 0.0))
+    return Axis(dates=np.array(sorted(dates)), end=end, until=max(end, experiment.until),
+                edge_s=2.0 * max(EDGE_S, interval if experiment.slow else 0.0))  # fmt: skip
 
 
 def _running(pieces: Sequence[Piece]) -> list[float]:

@@ -52,6 +52,7 @@ def prepare_experiment(
 ) -> tuple[InferenceSetup, Experiment]:
     """Set up an experiment with the recordings to learn from; see :func:`diagnosis.setup.inference_setup.prepare`."""
     setup = prepare(gearbox, recordings, holdout, baseline, switched_off=switched_off, catalogue=catalogue, even=even)
+    starts_at = start_times([*recordings, *holdout])
     unknowns = usual_unknowns(
         setup.model.network, (*recordings, *baseline), setup.channels, interval=setup.scale.interval,
         gain_of_torque=torque_gain(gearbox.network()),
@@ -65,7 +66,8 @@ def prepare_experiment(
         session_of=session_by_recording(recordings, holdout, baseline),
         healthy=frozenset(r.name for r in baseline),
         switched_off=frozenset(switched_off),
-        starts_at=start_times([*recordings, *holdout]),
+        starts_at=starts_at,
+        until=max(starts_at[r.name] + float(r.time[-1]) for r in (*recordings, *holdout)),
     )
 
 

@@ -20,7 +20,7 @@ from models.assembly.gearbox import Gearbox, load_gearbox
 from models.mechanisms import CATALOGUE, Placed, Scale
 from models.network.laws import symbol
 
-AXIS = Axis(dates=np.array([2000.0, 6000.0]), end=10_000.0)
+AXIS = Axis(dates=np.array([2000.0, 6000.0]), end=10_000.0, until=12_000.0)
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,7 @@ def test_a_step_is_on_after_its_date_and_in_later_recordings(air: Placed) -> Non
 def test_no_date_is_in_the_last_moments() -> None:
     """A single odd row at the end is no change of the machine."""
     assert AXIS.moment("since").upper == pytest.approx(8000.0)
-    assert Axis(dates=np.zeros(0), end=600.0).moment("since").upper == pytest.approx(300.0)
+    assert Axis(dates=np.zeros(0), end=600.0, until=600.0).moment("since").upper == pytest.approx(300.0)
 
 
 def test_for_a_while_ends(air: Placed) -> None:
@@ -66,6 +66,16 @@ def test_courses_over_hours_go_on_in_the_next_recording(air: Placed) -> None:
     for variant, expected in zip(hypothesis.variants, (0.1, 1 - np.exp(-2 / 3), np.exp(-2 / 3)), strict=True):
         own = {name: v for name, v in zip(names, variant.tolist(), strict=True) if name != "start"}
         assert value(hypothesis.term, 3600.0, 3600.0, **own) == pytest.approx(expected)
+
+
+def test_what_grows_stays_after_the_last_recording_as_it_was(air: Placed) -> None:
+    """An FMU may run for days; that growth goes on nobody has measured."""
+    term = changing(air, over_hours(AXIS), AXIS).term
+    assert isinstance(term, Placed)
+    own = {"strength": 1.0, "linear": 1.0, "settling": 0.0, "fading": 0.0}
+    assert (
+        value(term, 1e6, 10_000.0, **own) == value(term, 2000.0, 10_000.0, **own) == pytest.approx(12_000.0 / 72_000.0)
+    )
 
 
 def test_an_exported_step_acts_throughout(fzg: Gearbox, air: Placed) -> None:

@@ -238,3 +238,18 @@ def test_a_reading_that_stands_still_is_a_candidate_in_those_times_only(fzg: Gea
     acts = sp.lambdify([symbol("time"), *(symbol(p.name) for p in found.term.parameters)], found.term.expression)
     assert [float(acts(at, 1.0, 0.0)) for at in (2700.0, 3100.0, 6900.0, 7300.0)] == [0.0, 1.0, 1.0, 0.0]
     assert acts(3600.0, 1.0, experiment.starts_at["b"]) == 0.0
+
+
+def test_what_grows_is_known_to_the_end_of_the_last_recording(fzg: Gearbox) -> None:
+    made = [recorded(fzg, name, hours=hours, seed=seed) for seed, (name, hours) in enumerate((("a", 1.0), ("b", 0.5)))]
+    setup, experiment = prepare_experiment(fzg, made[:1], made[1:])
+    axis = axis_of(experiment)
+    assert axis.end == pytest.approx(3590.0, abs=30.0)
+    assert axis.until == made[0].time[-1] + made[1].time[-1]
+    for one in outside_of(setup, experiment):
+        assert one.term is not None
+        at = {symbol(p.name): float(p.name.endswith("_hours") or p is one.term.strength) for p in one.term.parameters}
+        now = {symbol(p.name): p.start for p in one.term.parameters if p.name == one.clock} | {symbol("speed"): 1e3}
+        later, last = (float(one.term.expression.xreplace(at | now | {symbol("time"): time}))
+                       for time in (1e6, axis.until - axis.end))  # fmt: skip
+        assert later == pytest.approx(last) and later > 0.0
