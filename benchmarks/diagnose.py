@@ -1,6 +1,6 @@
 """What a diagnosis costs: wall time, processor time and memory, over size of the recordings and of the catalogue.
 
-python -m benchmarks.diagnose [contract] [sizes] [candidates] [--jobs 2]
+python -m benchmarks.diagnose [contract] [sizes] [candidates]
 
 The recordings come from the plant of ``conceal`` with a concealed effect, so that every stage of the search runs.
 """
@@ -97,7 +97,7 @@ def make_recordings(folder: Path, lengths_h: Sequence[float], step_s: float, eff
     return paths
 
 
-def once(train: Sequence[str], holdout: Sequence[str], share: float, jobs: int) -> None:
+def once(train: Sequence[str], holdout: Sequence[str], share: float) -> None:
     """Diagnose as the verb does, in a separate process; print time and memory as JSON."""
     marks = [("start and reading", time.perf_counter())]
     gearbox = load_gearbox("fzg")
@@ -105,7 +105,7 @@ def once(train: Sequence[str], holdout: Sequence[str], share: float, jobs: int) 
     kept = {EFFECT, *names[:: round(1.0 / share)]}
     catalogue = {name: CATALOGUE[name] for name in names if name in kept}
     learnt, judged, _ = read_by_role(train, holdout, (), gearbox.network())
-    found = diagnose(learnt, gearbox, holdout=judged, catalogue=catalogue, jobs=jobs,
+    found = diagnose(learnt, gearbox, holdout=judged, catalogue=catalogue,
                      progress=lambda line, *_: marks.append((line, time.perf_counter())))  # fmt: skip
     marks.append(("writing the report", time.perf_counter()))
     with tempfile.TemporaryDirectory() as folder:
@@ -118,9 +118,9 @@ def once(train: Sequence[str], holdout: Sequence[str], share: float, jobs: int) 
     json.dump({"rows": rows, "mechanisms": len(catalogue), "verdict": found.verdict, "stages": stages}, sys.stdout)
 
 
-def measured(train: Sequence[Path], holdout: Sequence[Path], *, jobs: int, share: float = 1.0) -> Cost:
+def measured(train: Sequence[Path], holdout: Sequence[Path], *, share: float = 1.0) -> Cost:
     """Run a diagnosis in a separate process and watch it from outside."""
-    given = {"train": [*map(str, train)], "holdout": [*map(str, holdout)], "share": share, "jobs": jobs}
+    given = {"train": [*map(str, train)], "holdout": [*map(str, holdout)], "share": share}
     code = f"from benchmarks.diagnose import once; once(**{given!r})"
     load, begin = psutil.getloadavg()[0], time.perf_counter()
     process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
@@ -166,7 +166,6 @@ def show(title: str, costs: Sequence[tuple[str, Cost]]) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("what", nargs="*", default=["contract", "sizes", "candidates"])
-    parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--sizes", type=int, default=len(SIZES), help="how many of the sizes, smallest first")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
@@ -174,9 +173,9 @@ def main() -> None:
         if {"contract", "candidates"} & set(given.what):
             paths = make_recordings(folder, (16.0, 2.0, 2.0, 2.0, 4.0), 10.0)
             shares = SHARES if "candidates" in given.what else (1.0,)
-            costs = [measured(paths[:3], paths[3:], jobs=given.jobs, share=share) for share in shares]
+            costs = [measured(paths[:3], paths[3:], share=share) for share in shares]
             rows = [(f"{share:.2f} of the catalogue", c) for share, c in zip(shares, costs, strict=True)]
-            show(f"Five recordings, 26 h together at 10 s, 7 channels, {given.jobs} processes", rows)
+            show("Five recordings, 26 h together at 10 s, 7 channels", rows)
             whole = costs[-1]
             print(f"targets: {whole.wall_s:.1f} of {TARGET_S:.0f} s, {whole.peak_bytes / 1e9:.2f} of "
                   f"{TARGET_BYTES / 1e9:.0f} GB")  # fmt: skip
@@ -187,8 +186,8 @@ def main() -> None:
             rows = []
             for label, hours, step_s in SIZES[: given.sizes]:
                 paths = make_recordings(folder, (0.75 * hours, 0.25 * hours), step_s)
-                rows.append((label, measured(paths[:1], paths[1:], jobs=given.jobs)))
-            show(f"One recording to learn from, one to judge by, {given.jobs} processes", rows)
+                rows.append((label, measured(paths[:1], paths[1:])))
+            show("One recording to learn from, one to judge by", rows)
             even = [(hours, c) for (_, hours, step_s), (_, c) in zip(SIZES, rows, strict=False) if step_s == ROW_S]
             if len(even) > 1:
                 hours = [h for h, _ in even]

@@ -51,7 +51,6 @@ def diagnose(
     correction: Correction | None = None,
     settings: Settings = SETTINGS,
     catalogue: Mapping[str, Mechanism] | None = None,
-    jobs: int = 1,
     progress: Progress = silent,
 ) -> Diagnosis:
     """Say whether recordings agree with the model of a gearbox, and if not, where, by what physics, and how strongly.
@@ -74,8 +73,6 @@ def diagnose(
         Numbers of the decision
     catalogue : mapping of str to Mechanism, optional
         By default :data:`models.mechanisms.CATALOGUE`
-    jobs : int
-        Processes
     progress : callable
         Told what is being done, as ``progress(what, done, of)``
 
@@ -134,7 +131,7 @@ def diagnose(
         progress("predicting the recordings free-running")
         return assemble(
             setup, experiment, posterior, decide(posterior), plain=plain if rest is None else others,
-            calibration=calibration, jobs=jobs,
+            calibration=calibration,
             others=None if rest is None else Others(posterior=rest, channels=faulty, apart=tuple(apart)),
         )  # fmt: skip
     except ArithmeticError as error:

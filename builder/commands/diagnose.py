@@ -81,7 +81,10 @@ class _OptionsOfMany(click.Command):
 @click.option("--fleet", is_flag=True,
               help="RECORDING is a folder with one folder per gearbox; hold* in it is held out, baseline* is a "
                    "baseline.")  # fmt: skip
-@worker_options(dask_help="Scheduler of a Dask cluster that the gearboxes of a fleet are spread over.")
+@worker_options(
+    jobs_help="Gearboxes of a fleet at the same time.",
+    dask_help="Scheduler of a Dask cluster that the gearboxes of a fleet are spread over.",
+)
 def diagnose(
     recordings: tuple[str, ...],
     gearbox: str,
@@ -149,7 +152,7 @@ def diagnose(
     _print_notes((*train, *held, *healthy))
     with atomic_folder(output) as stage, progress("starting") as tell:
         found = run(train, definition, holdout=held, baseline=healthy, switched_off=switched_off, correction=known,
-                    settings=settings, catalogue=catalogue, jobs=jobs, progress=tell)  # fmt: skip
+                    settings=settings, catalogue=catalogue, progress=tell)  # fmt: skip
         tell("writing the report")
         written = [path.name for path in write_files(found, definition, [*train, *held], stage)]
     for path in old:
@@ -171,9 +174,7 @@ def _print_notes(recordings: Sequence[Recording]) -> None:
 
 def _check_options(recordings: tuple[str, ...], others: tuple[str, ...], dask: str | None, *, fleet: bool) -> None:
     if not fleet and dask is not None:
-        raise click.UsageError(
-            "--dask spreads the gearboxes of a fleet; give --fleet with it, or --jobs for one gearbox"
-        )
+        raise click.UsageError("--dask spreads the gearboxes of a fleet; give --fleet with it")
     if fleet and (len(recordings) != 1 or others):
         raise click.UsageError(
             "--fleet takes one folder, with a folder per gearbox; hold* in it is held out, baseline* is a baseline"

@@ -72,7 +72,7 @@ def prove(
     if real is not None:
         if typed:
             raise InputError(f"--{_dashed(typed[0])} does not go with --real, which is one recording of a real plant")
-        _prove_real(real, output, jobs)
+        _prove_real(real, output)
         return
     with progress(LOADING):
         from builder.workflows.prove import prove as run
@@ -161,11 +161,11 @@ def _settings_of_made(
                     families=families, cells_every=cells_every, baselines=baselines, removed=removed)  # fmt: skip
 
 
-def _prove_real(name: str, output: Path, jobs: int) -> None:
+def _prove_real(name: str, output: Path) -> None:
     with progress(LOADING):
         from builder.workflows.prove_real import PLANTS, RESULT, prove_real, rows_of
     with progress("starting") as told:
-        result = prove_real(PLANTS[name], output, jobs=jobs, progress=told)
+        result = prove_real(PLANTS[name], output, progress=told)
     for finding in result["findings"]:
         console.out.print(f"{finding['grade']}: {finding['title']} ({finding['probability']:.2f})")
     console.table(f"{name}: {result['verdict'].replace('_', ' ')}", ["", "", "limit", ""], rows_of(result))

@@ -168,7 +168,7 @@ def diagnose_fleet(
     catalogue, correction, switched_off, settings
         See :func:`diagnosis.diagnose`
     jobs : int
-        Gearboxes at the same time on this machine; a single gearbox gets all processes
+        Gearboxes at the same time on this machine
     dask : str or None
         Scheduler of a Dask cluster that does the work instead
 
@@ -184,7 +184,6 @@ def diagnose_fleet(
     """
     _refuse_to_replace_summary(output / SUMMARY)
     outcomes, old = dict[str, MemberOutcome](), dict[str, list[Path]]()
-    inside = jobs if len(members) == 1 and dask is None else 1
 
     def readable() -> Iterator[tuple[object, ...]]:
         network = gearbox.network()
@@ -198,7 +197,7 @@ def diagnose_fleet(
                 read = [p for r in (*train, *held, *healthy) for p in r.files]
                 old[member.name] = files_left_over(output / member.name, (*train, *held), read)
                 recordings = (train, held, healthy)
-                yield member.name, recordings, gearbox, catalogue, correction, switched_off, settings, inside
+                yield member.name, recordings, gearbox, catalogue, correction, switched_off, settings
             except InputError as error:
                 outcomes[member.name] = _without_diagnosis(member.name, error)
 
@@ -221,13 +220,13 @@ def diagnose_fleet(
 
 def _diagnose(
     name: str, recordings: ByRole, gearbox: Gearbox, catalogue: Mapping[str, Mechanism], correction: Correction | None,
-    switched_off: Sequence[str], settings: Settings, jobs: int,
+    switched_off: Sequence[str], settings: Settings,
 ) -> MemberOutcome:  # fmt: skip
     train, holdout, baseline = recordings
     try:
         with tempfile.TemporaryDirectory() as folder:
             found = diagnose(train, gearbox, holdout=holdout, baseline=baseline, switched_off=switched_off,
-                             catalogue=catalogue, correction=correction, settings=settings, jobs=jobs)  # fmt: skip
+                             catalogue=catalogue, correction=correction, settings=settings)  # fmt: skip
             written = write_files(found, gearbox, [*train, *holdout], Path(folder))
             return MemberOutcome(row=_row(name, found), files={path.name: path.read_bytes() for path in written})
     except Exception as error:  # noqa: BLE001 - shown with its traceback at the end, when the others are done

@@ -131,7 +131,7 @@ def diagnose(
     """
     content = with_definition(files, gearbox)
     definition = DEFINITION if DEFINITION in content else gearbox
-    command = [sys.executable, "-c", BLIND, "diagnose", *arguments, "--gearbox", definition, "--jobs", "1",
+    command = [sys.executable, "-c", BLIND, "diagnose", *arguments, "--gearbox", definition,
                "--output", "out"]  # fmt: skip
     with tempfile.TemporaryDirectory(prefix="case-") as folder:
         room, begin, used = Path(folder), time.perf_counter(), os.times()

@@ -68,7 +68,7 @@ PLANTS: Mapping[str, RealPlant] = {
 }  # fmt: skip
 
 
-def prove_real(plant: RealPlant, output: Path, *, jobs: int = 1, progress: Progress = silent) -> dict[str, Any]:
+def prove_real(plant: RealPlant, output: Path, *, progress: Progress = silent) -> dict[str, Any]:
     """Diagnose a real plant, build the FMU that its correction makes, and compare that with the held-out recording.
 
     Parameters
@@ -76,8 +76,6 @@ def prove_real(plant: RealPlant, output: Path, *, jobs: int = 1, progress: Progr
     plant : RealPlant
     output : Path
         Gets everything that a diagnosis writes, ``<definition>_native.fmu`` and ``real.json``
-    jobs : int
-        Processes
     progress : callable
         Told what is being done
 
@@ -96,7 +94,7 @@ def prove_real(plant: RealPlant, output: Path, *, jobs: int = 1, progress: Progr
     network = gearbox.network()
     train, held, _ = read_by_role([f"{file}@{plant.train}"], [f"{file}@{plant.hold}"], [], network)
     with atomic_folder(output) as stage:
-        found = diagnose(train, gearbox, holdout=held, jobs=jobs, progress=progress)
+        found = diagnose(train, gearbox, holdout=held, progress=progress)
         progress("writing the report")
         write_files(found, gearbox, [*train, *held], stage)
         correction = read_correction(stage / CORRECTION, gearbox)

@@ -81,7 +81,6 @@ def assemble(
     plain: Fit,
     calibration: Calibration,
     others: Others | None = None,
-    jobs: int = 1,
 ) -> Diagnosis:
     """The result of a decision.
 
@@ -97,8 +96,6 @@ def assemble(
         With model error
     others : Others or None
         What all but faulty channels say, if there are any
-    jobs : int
-        Processes
     """
     settings, known = posterior.settings, setup.known
     faulty = () if others is None else others.channels
@@ -110,7 +107,7 @@ def assemble(
             experiment, held_out_experiment(setup, experiment), plain=plain,
             found=_final(best, plain, faulty),
             explanation=None if faulty else best or posterior.nothing, near=calibration.near, counting=counting,
-            noise_K=setup.noise_K, jobs=jobs,
+            noise_K=setup.noise_K,
         )  # fmt: skip
         holdout = _fits(setup, predicted.holdout, counting)
         against = holdout.contradict(predicted.holdout_gain, setup.noise_K, posterior.class_threshold)

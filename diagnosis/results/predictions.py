@@ -13,7 +13,6 @@ from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.learnt_error import is_writable, with_learnt_error
 from diagnosis.engine.predict import Prediction, log_score_gain, overall_rmse, predict, with_pieces_of
 from diagnosis.engine.set_apart import without_channels
-from models.base.parallel import run_parallel
 from models.base.types import Array
 from models.quantities.quantities import is_total_loss
 from models.terms.term import Term
@@ -50,7 +49,7 @@ class Predicted:
 
 def predict_recordings(
     experiment: Experiment, judged: Experiment, *, plain: Fit, found: Fit, explanation: Judged | None,
-    near: NearReadings, counting: Collection[str], noise_K: float, jobs: int,
+    near: NearReadings, counting: Collection[str], noise_K: float,
 ) -> Predicted:  # fmt: skip
     """Predict all recordings, with model error written into the best explanation if that helps.
 
@@ -74,8 +73,8 @@ def predict_recordings(
     ArithmeticError
         If temperatures leave all bounds with the parameters as delivered, calibrated or found.
     """
-    train = _states(experiment, plain, found, jobs, near=[trajectory.T for trajectory in found.trajectories])
-    holdout = _states(judged, plain, found, jobs)
+    train = _states(experiment, plain, found, near=[trajectory.T for trajectory in found.trajectories])
+    holdout = _states(judged, plain, found)
     final, learnt, left_out_K = found, tuple[Term, ...](), float("nan")
     after = [train["found"], holdout["found"]]
     if explanation is not None and explanation.fit is not None:
@@ -83,7 +82,7 @@ def predict_recordings(
             if is_writable(explanation.error_class):
                 written, terms = with_learnt_error(explanation.fit, near, explanation.error_class)
                 there: list[Sequence[Prediction]] = [
-                    _predictions(written, one, _courses(known), jobs)
+                    _predictions(written, one, _courses(known))
                     for one, known in zip((experiment, judged), after, strict=True)
                 ]  # fmt: skip
                 columns = temperatures(experiment.pieces[0].channels, counting)
@@ -110,26 +109,22 @@ def temperatures(channels: Sequence[str], counting: Collection[str]) -> list[int
 
 
 def _states(
-    pieces_of: Experiment, plain: Fit, found: Fit, jobs: int, *, near: Sequence[Array] | None = None
+    pieces_of: Experiment, plain: Fit, found: Fit, *, near: Sequence[Array] | None = None
 ) -> Predictions:  # fmt: skip
     """As delivered, calibrated, with the findings; `near`: temperatures by the findings, if they are known."""
-    before = _predictions(plain, pieces_of, [None] * len(pieces_of.pieces), jobs, as_delivered=True)
-    tuned = _predictions(plain, pieces_of, _courses(before), jobs)
-    last = tuned if found is plain else _predictions(found, pieces_of, near or _courses(tuned), jobs)
+    before = _predictions(plain, pieces_of, [None] * len(pieces_of.pieces), as_delivered=True)
+    tuned = _predictions(plain, pieces_of, _courses(before))
+    last = tuned if found is plain else _predictions(found, pieces_of, near or _courses(tuned))
     return {"before": before, "calibrated": tuned, "found": last}
 
 
 def _predictions(
-    fit: Fit, pieces_of: Experiment, near: Sequence[Array | None], jobs: int, *, as_delivered: bool = False
+    fit: Fit, pieces_of: Experiment, near: Sequence[Array | None], *, as_delivered: bool = False
 ) -> list[Prediction]:  # fmt: skip
     there = with_pieces_of(fit.experiment, pieces_of)
     z = None if as_delivered else fit.z
-    return run_parallel(_predict, [(there, index, z, T) for index, T in enumerate(near)], jobs=jobs)
-
-
-def _predict(experiment: Experiment, index: int, z: Array | None, near: Array | None) -> Prediction:
     with np.errstate(over="ignore", invalid="ignore"):  # what leaves all bounds is refused there
-        return predict(experiment, index, z, guess=near)
+        return [predict(there, index, z, guess=T) for index, T in enumerate(near)]
 
 
 def _courses(found: Sequence[Prediction]) -> list[Array]:

@@ -44,7 +44,7 @@ def test_outcome(name: str, fzg: Gearbox, tmp_path: Path) -> None:
     values = {"mesh": 0.9, "h_air": 1.15, "bearing": 1.2, "C_oil": 1.08}
     file = tmp_path / "run.csv"
     path = record(fzg.network(), fzg, file, seed=case.seed, hours=case.hours, bias=case.bias_K, parameters=values)
-    found = diagnose(path, fzg, jobs=1)
+    found = diagnose(path, fzg)
     assert found.verdict == case.verdict
     assert [(f.mechanism, f.node) for f in found.findings] == ([case.found] if case.found else [])
     for finding in found.findings:

@@ -44,12 +44,7 @@ def diagnosed(
     off = {"mesh": 1.1, "h_air": 0.85, "h_oil_housing": 1.2, "seal": 0.9}
     record(cooled, fzg, folder / "train.csv", seed=1, hours=5.0, parameters=off)
     record(cooled, fzg, folder / "hold.csv", seed=2, hours=2.5, parameters=off)
-    assert (
-        run_cli(
-            "diagnose", folder / "train.csv", "--holdout", folder / "hold.csv", "--jobs", 1, "--output", folder / "out"
-        )
-        == 0
-    )
+    assert run_cli("diagnose", folder / "train.csv", "--holdout", folder / "hold.csv", "--output", folder / "out") == 0
     return folder, folder / "out"
 
 

@@ -180,7 +180,7 @@ def test_a_diagnosis_gets_copies_of_its_recordings_and_nothing_else(
     work = lines.files_of(given["recordings"], Task(case="a"))
     _, record = diagnose(Task(case="a"), *work, "fzg")
     assert rooms == [(["gearbox.toml", "hold_1.csv", "train_1.csv"], [
-        "diagnose", "train_1.csv", "--holdout", "hold_1.csv", "--gearbox", "gearbox.toml", "--jobs", "1",
+        "diagnose", "train_1.csv", "--holdout", "hold_1.csv", "--gearbox", "gearbox.toml",
         "--output", "out",
     ])]  # fmt: skip
     assert (record["status"], record["answer"], record["message"]) == ("failed", None, "broken")

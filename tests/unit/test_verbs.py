@@ -46,7 +46,7 @@ def recorder(asked: list[dict[str, Any]]) -> Any:
     return ask
 
 
-def test_diagnose_passes_catalogue_rate_and_jobs_on(
+def test_diagnose_passes_catalogue_and_rate_on(
     recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: list[dict[str, Any]] = []
@@ -66,12 +66,12 @@ def test_diagnose_passes_catalogue_rate_and_jobs_on(
         "--odds-unknown",
         0.2,
     )
-    invoked(*usual, "--without-mechanism", "windage", "--mechanisms", own, *numbers, "--jobs", 1)
+    invoked(*usual, "--without-mechanism", "windage", "--mechanisms", own, *numbers)
     plain, special = asked
     assert set(plain["catalogue"]) == set(CATALOGUE)
     assert set(CATALOGUE) - set(special["catalogue"]) == {"windage"}
     assert f'name = "{min(set(special["catalogue"]) - set(CATALOGUE))}"' in own.read_text()
-    assert (plain["settings"], special["jobs"]) == (Settings(), 1)
+    assert plain["settings"] == Settings()
     assert special["settings"] == Settings(
         false_alarm_rate=0.01, matters_K=2.0, matters_W=5.0, claim_from=0.8, odds_unknown=0.2
     )
