@@ -237,7 +237,6 @@ def inject_set(
         if injector.real.mapping is not None:
             files[injector.real.mapping.name] = injector.real.mapping.read_bytes()
         write_files(folder, files, truth / f"{name}.json", facts)
-        names.append(name)
         if progress is not None:
             progress(k + 1, number)
     return names
