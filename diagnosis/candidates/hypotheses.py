@@ -101,7 +101,7 @@ class Hypothesis:
     @property
     def of_measurement(self) -> bool:
         """True if it is a fault of a thermometer or of a recorded input."""
-        return self.term is not None and self.term.of_measurement
+        return self.term is not None and (self.term.of_measurement or self.term.kind == "sensor")
 
     @property
     def holds_a_reading(self) -> bool:
