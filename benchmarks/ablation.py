@@ -21,7 +21,6 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.other_methods import read_case
 from diagnosis.decision.scanned import scan_in_classes
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import calibrate_with_error
@@ -31,7 +30,11 @@ from diagnosis.engine.learnt import ErrorClass, error_classes
 from diagnosis.engine.model_error.groups import GROUPS
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.scan import scan
+from diagnosis.proof.cases.case_files import DEFINITION
 from diagnosis.proof.scoring.truth import CONTROL, Truth, read_truths
+from diagnosis.recordings.read import read_recordings
+from diagnosis.recordings.recording import Recording
+from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.parallel import iterate_parallel
 
 AS_IT_IS = "as it is"
@@ -56,6 +59,16 @@ def variants() -> dict[str, Sequence[ErrorClass]]:
         "full alone": every[-1:],
         "none, splits, full": [one for one in every if one.name in ("none", "splits", "full")],
     }
+
+
+def read_case(folder: Path, gearbox: str) -> tuple[Gearbox, Sequence[Recording], Sequence[Recording]]:
+    """The machine of a case, with a definition of its own or that of the set, and what is learnt from and held out."""
+    own = folder / DEFINITION
+    machine = load_gearbox(own if own.is_file() else gearbox)
+    train, held = (
+        read_recordings(sorted(folder.glob(f"{kind}_*.csv*")), machine.network()) for kind in ("train", "hold")
+    )
+    return machine, train, held
 
 
 def scan_case(folder: Path, gearbox: str) -> dict[str, Any]:

@@ -27,6 +27,7 @@ from sklearn.neural_network import MLPRegressor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
+from benchmarks.ablation import read_case
 from benchmarks.latent_heat import latent_heat
 from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of
 from diagnosis.engine.fit import Experiment, Fit, Linearised, calibrate
@@ -34,15 +35,12 @@ from diagnosis.engine.predict import Prediction, predict
 from diagnosis.engine.prepare import held_out_experiment, prepare_experiment
 from diagnosis.engine.scan import scan
 from diagnosis.forward.term_on_grid import TermOnGrid
-from diagnosis.proof.cases.case_files import DEFINITION
 from diagnosis.proof.scoring.lines import Task
 from diagnosis.proof.scoring.outcome import outcome
 from diagnosis.proof.scoring.truth import CONTROL, read_truths
-from diagnosis.recordings.read import read_recordings
-from diagnosis.recordings.recording import Recording
 from diagnosis.results.places import node_in
 from diagnosis.setup.inference_setup import InferenceSetup
-from models.assembly.gearbox import Gearbox, load_gearbox
+from models.assembly.gearbox import load_gearbox
 from models.base.parallel import run_parallel
 from models.base.types import Array
 from models.mechanisms import CATALOGUE
@@ -197,16 +195,6 @@ def _table(predictions: Sequence[Prediction]) -> tuple[Array, Array]:
 
 
 # ---------------------------------------------------------------------- a folder of cases
-
-
-def read_case(folder: Path, gearbox: str) -> tuple[Gearbox, Sequence[Recording], Sequence[Recording]]:
-    """The machine of a case, with a definition of its own or that of the set, and what is learnt from and held out."""
-    own = folder / DEFINITION
-    machine = load_gearbox(own if own.is_file() else gearbox)
-    train, held = (
-        read_recordings(sorted(folder.glob(f"{kind}_*.csv*")), machine.network()) for kind in ("train", "hold")
-    )
-    return machine, train, held
 
 
 def answers_to_files(folder: Path, gearbox: str) -> dict[str, Any]:

@@ -40,7 +40,7 @@ class Axis:
     end : float
         End of the last recording learnt from, [s]
     until : float
-        End of the last of all, held-out ones too, [s]: how what grows goes on after it nobody has measured
+        End of the last of all, held-out ones too, [s]; what grows is not known to go on after it
     edge_s : float
         Shortest time that a change takes, [s]
     """

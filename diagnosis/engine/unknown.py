@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from diagnosis.engine.point import Column, Point, Setting
-from diagnosis.forward.observation import at_points, delay_column
+from diagnosis.forward.observation import delay_column, to_points
 from diagnosis.forward.recurrence import lagged
 from models.network.laws import Parameter
 from models.quantities.quantities import TOTAL_LOSS
@@ -126,7 +126,7 @@ class LossGain(Unknown):
 
     def column(self, point: Point, z: float) -> Column:
         """The loss itself."""
-        loss = at_points(point.trajectory.loss)
+        loss = to_points(point.trajectory.loss)
         return Column(reading=point.reading(TOTAL_LOSS, loss * self.per_z(z)))
 
 

@@ -54,7 +54,7 @@ def readings(model: NetworkOnGrid, trajectory: Trajectory, sensors: Sensors) -> 
     read = np.empty((len(trajectory.T), len(sensors.channels)))
     nodes = dict(zip(model.parts, trajectory.T.T, strict=False))
     if sensors.mixes:
-        nodes |= {name: at_points(T) for name, T in boundary_temperatures(model, trajectory).items()}
+        nodes |= {name: to_points(T) for name, T in boundary_temperatures(model, trajectory).items()}
     for index, name in enumerate(sensors.channels):
         if is_total_loss(name):
             read[:, index] = delayed_loss(trajectory, sensors.loss_delay) * sensors.loss_gain
@@ -89,7 +89,7 @@ def reading_columns(
         if is_total_loss(name):
             slope = 0.5 * trajectory.loss_slope[:, None, :]
             loss = (slope @ T[1:] + slope @ T[:-1])[:, 0] + direct_loss
-            read[:, index] = at_points(loss) * sensors.loss_gain
+            read[:, index] = to_points(loss) * sensors.loss_gain
         else:
             felt = _felt(model, nodes, sensors, name, trajectory)
             read[:, index] = lagged(felt, trajectory.piece.steps, sensors.lag[index])
@@ -108,14 +108,14 @@ def _felt(
     return felt
 
 
-def at_points(values: Array) -> Array:
+def to_points(values: Array) -> Array:
     """From the middles of the intervals to the grid points, shape (K, ...) to (K + 1, ...)."""
     return np.concatenate([values[:1], 0.5 * (values[1:] + values[:-1]), values[-1:]])
 
 
 def delayed_loss(trajectory: Trajectory, delay: float) -> Array:
     """Total loss at the grid points as it was `delay` seconds before, shape (K + 1,), [W]."""
-    loss, time = at_points(trajectory.loss), trajectory.piece.time
+    loss, time = to_points(trajectory.loss), trajectory.piece.time
     return loss if delay == 0.0 else np.interp(time - delay, time, loss)
 
 

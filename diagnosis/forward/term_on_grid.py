@@ -16,7 +16,7 @@ from diagnosis.forward.extra_states import Memories
 from diagnosis.forward.grid import Piece
 from diagnosis.forward.kept import kept
 from diagnosis.forward.network_on_grid import NetworkOnGrid
-from diagnosis.forward.observation import Sensors, boundary_temperatures
+from diagnosis.forward.observation import Sensors, boundary_temperatures, to_points
 from diagnosis.forward.sensor_fault import passed_on
 from diagnosis.forward.trajectory import Trajectory, heat_change, losses_along
 from models.base.types import Array
@@ -74,8 +74,7 @@ class TermOnGrid:
         """
         model, piece = self.model, trajectory.piece
         if at_points:
-            inputs = np.concatenate([piece.inputs[:1], 0.5 * (piece.inputs[1:] + piece.inputs[:-1]), piece.inputs[-1:]])
-            T, time = trajectory.T, piece.time
+            inputs, T, time = to_points(piece.inputs), trajectory.T, piece.time
             memory = np.zeros((len(T), len(model.network.states)))
             power = np.zeros((len(T), len(model.laws.components)))
         else:

@@ -21,7 +21,7 @@ import numpy as np
 from scipy.linalg.lapack import dpotrf, dtrtri
 
 from diagnosis.forward.network_on_grid import NetworkOnGrid
-from diagnosis.forward.observation import Sensors, at_points
+from diagnosis.forward.observation import Sensors, to_points
 from diagnosis.forward.trajectory import Trajectory
 from models.base.types import Array
 from models.quantities.quantities import is_total_loss
@@ -125,7 +125,7 @@ class Whitening:
                 step = transition[k - 1]
                 covariance = step @ covariance @ step.T + renewed[k - 1]
             PH = covariance @ H.T
-            factor, failed = dpotrf(H @ PH + white_k, lower=True)  # LAPACK itself: NumPy's checks take twice as long
+            factor, failed = dpotrf(H @ PH + white_k, lower=True)  # NumPy's take six times as long for 7 x 7
             if failed:
                 raise np.linalg.LinAlgError("the covariance of readings is not positive definite")
             root[k], _ = dtrtri(factor, lower=True)
@@ -184,7 +184,7 @@ def reading_variance(model: NetworkOnGrid, trajectory: Trajectory, sensors: Sens
     for index, name in enumerate(sensors.channels):
         if is_total_loss(name):
             total = trajectory.loss
-            at = at_points(total)
+            at = to_points(total)
             variance[:, index] += (noise.loss_relative_sd * at) ** 2 / np.maximum(piece.counts[:, index], 1.0)
             # Where the operating point jumps, a reading may belong to either side.
             jump = np.abs(np.diff(total, prepend=total[0], append=total[-1]))
@@ -203,7 +203,7 @@ def _observation(model: NetworkOnGrid, trajectory: Trajectory, sensors: Sensors,
     for index, name in enumerate(sensors.channels):
         if is_total_loss(name):
             slope = trajectory.loss_slope
-            H[:, index, : model.n] = at_points(slope)
+            H[:, index, : model.n] = to_points(slope)
         else:
             H[:, index, model.part_index(name)] = 1.0
     return H

@@ -73,7 +73,7 @@ def refilled(values: Mapping[str, Any], path: str, notes: Annotations) -> tuple[
         Path of all that changed: the whole oil; else `path`
     """
     table, _, key = path.rpartition(".")
-    if path == "oil.named" and "seal" in values:
+    if path == "oil.named" and "seal" in values:  # an oil without geometry has no name, which the validation tells
         own = {key: value for key, value in values["oil"].items() if key not in Fluid.model_fields}
         for of_oil in Fluid.model_fields:
             _forget(notes, f"oil.{of_oil}")

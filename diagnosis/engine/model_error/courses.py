@@ -24,7 +24,7 @@ import numpy as np
 import sympy as sp
 
 from diagnosis.engine.point import Point
-from diagnosis.forward.observation import at_points, boundary_temperatures
+from diagnosis.forward.observation import boundary_temperatures, to_points
 from diagnosis.forward.recurrence import lagged
 from models.base.types import Array
 from models.formulas.extremes import Max, Min
@@ -129,7 +129,7 @@ class View:
         parts = self.model.parts
         if node in parts:
             return np.asarray(self.trajectory.T[:, parts.index(node)])
-        return at_points(self.boundaries[node])
+        return to_points(self.boundaries[node])
 
     def input(self, name: str) -> Array:
         """Mean of an input over the intervals, shape (K,)."""

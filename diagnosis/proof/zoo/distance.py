@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from diagnosis.engine.fit import Experiment
+from diagnosis.engine.fit import NO_SOLUTION, Experiment
 from diagnosis.engine.point import Machine, Point
 from diagnosis.engine.prepare import usual_unknowns
 from diagnosis.engine.unknown import NetworkParameter
@@ -109,7 +109,7 @@ def distance_K(plant: ZooPlant, session: Sequence[Programme]) -> float:
     ]
     try:
         return _fitted_rms(_experiment(gearbox, recordings))
-    except (ArithmeticError, np.linalg.LinAlgError, InputError):
+    except NO_SOLUTION:
         return np.inf
 
 

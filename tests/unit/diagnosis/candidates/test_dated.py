@@ -69,7 +69,7 @@ def test_courses_over_hours_go_on_in_the_next_recording(air: Placed) -> None:
 
 
 def test_what_grows_stays_after_the_last_recording_as_it_was(air: Placed) -> None:
-    """An FMU may run for days; that growth goes on nobody has measured."""
+    """An FMU may run for days; the recordings say nothing of growth after them."""
     term = changing(air, over_hours(AXIS), AXIS).term
     assert isinstance(term, Placed)
     own = {"strength": 1.0, "linear": 1.0, "settling": 0.0, "fading": 0.0}

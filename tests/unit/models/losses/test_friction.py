@@ -75,6 +75,12 @@ def test_contact_state_agrees_with_the_formulas_one_by_one() -> None:
     assert pytest.approx(T_in + rise, abs=0.01) == T_film
 
 
+def test_pitch_point_pressure() -> None:
+    state = solved(torque=200.0)
+    at_C = int(np.argmin(np.abs(MESH.rho_1 - GEARBOX.stage[0].pair().T1C)))
+    assert state.p_H[0, at_C] == pytest.approx(1347e6, rel=5e-3)
+
+
 def test_sliding_loss_is_the_power_of_the_friction_forces() -> None:
     state = solved()
     sliding, rolling = MESH.loss(
