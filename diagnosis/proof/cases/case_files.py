@@ -26,8 +26,8 @@ def case_names(number: int) -> list[str]:
 
     Examples
     --------
-    >>> case_names(2)
-    ['case_001', 'case_002']
+    >>> case_names(2), case_names(1000)[0]
+    (['case_001', 'case_002'], 'case_0001')
     """
     digits = max(3, len(str(number)))
     return [f"case_{i:0{digits}d}" for i in range(1, number + 1)]

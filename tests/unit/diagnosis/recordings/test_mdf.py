@@ -9,7 +9,11 @@ import pandas as pd
 import pytest
 
 from diagnosis.recordings.mdf import _named_apart, _on_rows_of
+from diagnosis.recordings.read import read_recordings
+from models.assembly.gearbox import load_gearbox
 from models.base.errors import InputError
+
+ROD = Path(__file__).parents[4] / "examples/data/heated_rod.csv.gz"
 
 
 def test_samples_far_from_a_row_are_in_none() -> None:
@@ -40,6 +44,21 @@ def test_rows_are_those_of_the_first_channel_that_is_there() -> None:
     np.testing.assert_array_equal(table["time_s"], [0.0, 10.0, 20.0])
     with pytest.raises(InputError, match="channel speed_rpm is missing; it has: T_cell, heater_power"):
         _on_rows_of(["speed_rpm"], [cell, power], Path("rod.mf4"))
+
+
+def test_a_machine_without_a_shaft_is_read_as_its_table_is(tmp_path: Path) -> None:
+    asammdf = pytest.importorskip("asammdf")
+    table, rod = pd.read_csv(ROD, nrows=100), load_gearbox("heated_rod")
+    table.to_csv(tmp_path / "rod.csv", index=False)
+    with asammdf.MDF(version="4.10") as mdf:
+        for name in table.columns[1:]:
+            mdf.append([asammdf.Signal(table[name].to_numpy(float), table["time_s"].to_numpy(float), name=name)])
+        mdf.save(tmp_path / "rod.mf4")
+    ours, theirs = (read_recordings(tmp_path / f"rod.{ending}", rod)[0] for ending in ("mf4", "csv"))
+    np.testing.assert_array_equal(ours.time, theirs.time)
+    for mine, other in zip(ours.channels, theirs.channels, strict=True):
+        assert mine.name == other.name
+        np.testing.assert_array_equal(mine.values, other.values)
 
 
 def test_a_channel_that_several_groups_have_is_named_with_its_group() -> None:
