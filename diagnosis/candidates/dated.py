@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -171,15 +172,17 @@ def _products(first: Iterable[float], second: Iterable[float]) -> Array:
     return np.array([(a, b) for a in first for b in second]).reshape(-1, 2)
 
 
-def changing(placed: Placed, course: DatedCourse, axis: Axis, *, sd: float | None = None) -> Hypothesis:
+def changing(
+    placed: Placed, course: DatedCourse, axis: Axis, *, sd: float | None = None, every_shape: bool = False
+) -> Hypothesis:
     """A law times a course in time.
 
     Parameters
     ----------
-    placed : Placed
-        Its shape parameters start from the middles of their grids
     sd : float, optional
         Prior of the strength; by default that of the law
+    every_shape : bool
+        Whether all grid points of its shape parameters are tried; otherwise they start from the middles of the grids
 
     Returns
     -------
@@ -203,8 +206,9 @@ def changing(placed: Placed, course: DatedCourse, axis: Axis, *, sd: float | Non
         expression=term.expression * along,
         parameters=(replace(strength, sd=sd or strength.sd), *shapes, *added, clock),
     )
-    middle = [p.grid[len(p.grid) // 2] if p.grid else p.start for p in shapes]
-    rows = [[1.0, *middle, *variant, clock.start] for variant in course.variants.tolist()]
+    grids = [p.grid or (p.start,) for p in shapes]
+    tried = product(*grids) if every_shape else [tuple(grid[len(grid) // 2] for grid in grids)]
+    rows = [[1.0, *shape, *variant, clock.start] for shape in tried for variant in course.variants.tolist()]
     return Hypothesis(name=name, place=placed.place, family=placed.family, term=term, law=law, variants=np.array(rows),
                       how=course.how, ending=course.ending, clock=clock.name,
                       date=next((p.name for p in added if p.name == f"{label}_since"), None))  # fmt: skip

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from diagnosis.candidates.controls import moved_set_points
 from diagnosis.candidates.dated import (
     Axis,
     carried_on,
@@ -46,13 +47,14 @@ def candidates_of(setup: InferenceSetup, experiment: Experiment) -> tuple[Hypoth
     -------
     tuple of Hypothesis
         Mechanisms of the catalogue, changes at a date and over hours, laws of time that go on in the next recording,
-        parameters outside their priors
+        other set-points of known controls, parameters outside their priors
     """
     network = experiment.machine.model.network
     known = {p.name for p in network.parameters}  # what the machine is known to have is there once
     placed = [one for m in setup.catalogue.values() for one in m.placed(network, setup.scale, setup.channels)
               if one.strength.name not in known]  # fmt: skip
     factors = factors_of(network, setup.scale, setup.channels)
+    controls = list(moved_set_points(setup.known.findings, setup.scale))
     axis = axis_of(experiment)
     several = len({piece.recording for piece in experiment.pieces} - experiment.healthy) > 1
     spans = standing_still(experiment)
@@ -67,6 +69,13 @@ def candidates_of(setup: InferenceSetup, experiment: Experiment) -> tuple[Hypoth
                 if one.form == "stuck" and one.place in spans
             ),
             *changes(factors, placed, axis, _sensor_sd(experiment)),
+            *(hypothesis_of(one) for one in controls),
+            *(
+                changing(one, course, axis, every_shape=True)
+                for one in controls
+                for course in (step(axis, slow=False), for_a_while(axis))
+                if len(course.variants)
+            ),
             *(carried_on(one, axis) for one in placed if several and has_clock(one)),
             *parameters_outside(experiment),
         )

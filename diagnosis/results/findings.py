@@ -317,7 +317,10 @@ def _heats_with(fit: Fit, effect: Hypothesis, values: Array) -> list[Array]:
 def change_of(
     values: Values, effect: Hypothesis, experiment: Experiment, recordings: Sequence[Recording]
 ) -> Change | None:
-    """When an effect begins, by the time of the recording in which it does; None if it has no date."""
+    """When an effect begins, by the time of the recording in which it does; None if it has no date.
+
+    Its band does not go beyond the recordings: before them, and after them, all dates look alike.
+    """
     if effect.date is None:
         return None
     since, error = values[effect.date]
@@ -325,10 +328,13 @@ def change_of(
     begun = [name for name, start in starts.items() if start <= since] or [min(starts, key=lambda name: starts[name])]
     recording = next(r for r in recordings if r.name == max(begun, key=lambda name: starts[name]))
     at = since - starts[recording.name]
+    ends = (piece.time[-1] + starts[piece.recording] for piece in experiment.pieces if piece.recording in starts)
+    first, last = min(starts.values()) - starts[recording.name], float(max(ends)) - starts[recording.name]
     lasting = values.get(effect.date.removesuffix("since") + "lasting")
     return Change(
         recording=recording.name, from_s=at,
-        band_s=(at - BAND_SD * error, at + BAND_SD * error) if 0.0 < error < np.inf else None,
+        band_s=(max(at - BAND_SD * error, min(first, at)), min(at + BAND_SD * error, last))
+        if 0.0 < error < np.inf else None,
         to_s=None if lasting is None else at + lasting[0],
         utc=None if recording.start is None else (recording.start + timedelta(seconds=at)).astimezone(UTC).isoformat(),
     )  # fmt: skip

@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from builder.workflows.known_physics import known_finding
 from diagnosis import diagnose
+from diagnosis.candidates.controls import moved_set_points
+from diagnosis.candidates.dated import Axis, changing, step
 from diagnosis.engine import known_switches
 from diagnosis.engine.families import candidates_of
 from diagnosis.engine.fit import Experiment, Fit, calibrate
@@ -19,7 +22,7 @@ from diagnosis.report.write import correction_of
 from diagnosis.results.result import Diagnosis
 from models.assembly.gearbox import Gearbox
 from models.correction.corrected_gearbox import corrected_gearbox
-from models.correction.correction import Correction, Estimate, read_correction, write_correction
+from models.correction.correction import Correction, Estimate, Finding, read_correction, write_correction
 from models.correction.instruments import SensorCorrection
 from models.mechanisms import CATALOGUE, Scale
 from tests.unit.diagnosis.inference_example import NODES, recorded
@@ -151,3 +154,46 @@ def test_means_over_minutes_have_a_law_of_their_own(fzg: Gearbox, tmp_path: Path
     there, here = (float(law.subs({s: at[s.name] for s in law.free_symbols}))
                    for law in (state.averaged_update, declared.averaged_update))  # fmt: skip
     assert there == pytest.approx(here, rel=1e-12)
+
+
+@pytest.fixture(scope="module")
+def moved(fzg: Gearbox) -> tuple[Correction, list[Recording], Diagnosis]:
+    """A known cooler whose set-point is turned from 50 down to 40 degC in the first recording, and stays there."""
+    given = {"strength": (8.0, 0.0), "set_point": (50.0, 0.0), "band": (10.0, 0.0), "coolant": (27.0, 0.0)}
+    known = Correction.of(fzg, findings=[known_finding(fzg, fzg.network(), "cooler_proportional", given)])
+    axis = Axis(dates=np.array([5760.0]), end=10_800.0, until=18_000.0)
+    (control,) = moved_set_points(known.findings, Scale.of(fzg, speed=3300.0, torque=150.0))
+    lower = changing(control, step(axis, slow=False), axis)
+    rides = []
+    for name, seed, start, hours in (("before and after", 1, 0.0, 3.0), ("later", 2, 10_800.0, 1.5)):
+        true = {"strength": 1.0, "set_point": 40.0, "band": 10.0, "since": 5760.0, "within": 240.0, "start": start}
+        values = {f"{lower.added.label}_{key}": (value, 0.0) for key, value in true.items()}
+        turned = Finding.of(lower.added, values, mechanism=lower.name)
+        machine = known.model_copy(update={"findings": (*known.findings, turned)})
+        rides.append(recorded(fzg, name, hours=hours, seed=seed, correction=machine))
+    return known, rides, looked_for(rides, fzg, known)
+
+
+def test_a_set_point_that_is_turned_at_a_date_is_found(moved: tuple[Correction, list[Recording], Diagnosis]) -> None:
+    *_, found = moved
+    (finding,) = found.findings
+    assert (finding.mechanism, finding.place) == ("cooler_proportional_moved_set_point_step", "oil")
+    assert finding.grade == "claim" and finding.says.endswith(
+        "the known cooler proportional has another set-point (oil)."
+    )
+    (set_point,) = (p for p in finding.parameters if p.name == "set_point")
+    assert set_point.value == pytest.approx(40.0, abs=2.0 * set_point.stderr) and set_point.stderr < 2.0
+    assert finding.date is not None and finding.date.from_s == pytest.approx(5760.0, abs=120.0)
+    assert found.holdout.after < 0.1 < 5.0 * found.holdout.after < found.holdout.calibrated
+
+
+def test_its_correction_holds_the_control_as_it_was_last(
+    fzg: Gearbox, moved: tuple[Correction, list[Recording], Diagnosis], tmp_path: Path
+) -> None:
+    """Read back, with its clock at the end of what was recorded: the machine with the lower set-point."""
+    known, _, found = moved
+    write_correction(correction_of(found, fzg), tmp_path / "next.toml")
+    machine = corrected_gearbox(fzg, read_correction(tmp_path / "next.toml", fzg))
+    as_known = corrected_gearbox(fzg, known)
+    turned, before = (m.steady_state(speed=2500.0, torque=100.0) for m in (machine, as_known))
+    assert turned.temperatures["oil"] < before.temperatures["oil"] - 2.0

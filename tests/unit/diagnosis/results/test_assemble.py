@@ -22,7 +22,7 @@ from diagnosis.report.page import page
 from diagnosis.report.write import correction_of
 from diagnosis.results import predictions
 from diagnosis.results.assemble import _distinct, _remaining
-from diagnosis.results.findings import estimates_of
+from diagnosis.results.findings import change_of, estimates_of
 from diagnosis.results.result import Diagnosis
 from models.assembly.gearbox import Gearbox
 from models.correction.correction import correction_text, read_correction, write_correction
@@ -192,6 +192,17 @@ def test_a_link_that_changes_at_a_date_acts_like(
     assert read_answer(found.to_dict(), fzg).claims[0].what == "link"
     assert correction_of(found, fzg).findings[0].term.label == effect.term.label
     assert "strength" not in finding.equation and "since" not in finding.equation
+
+
+def test_the_band_of_a_date_ends_where_the_recordings_do(prepared: Prepared) -> None:
+    setup, experiment, _ = prepared
+    effect = next(one for one in candidates_of(setup, experiment) if one.name == "radiation_step")
+    assert effect.date is not None
+    for since, error, band in ((DATE_S, 100.0, (DATE_S - 200.0, DATE_S + 200.0)),
+                               (DATE_S, 1e6, (0.0, experiment.pieces[-1].time[-1])),
+                               (-50.0, 25.0, (-50.0, 0.0))):  # fmt: skip
+        change = change_of({effect.date: (since, error)}, effect, experiment, setup.recordings)
+        assert change is not None and change.band_s == pytest.approx(band)
 
 
 def test_what_remains_is_told_where_it_was_looked_for(prepared: Prepared, windage: Judged) -> None:
