@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 MADE = ("plant", "cases", "seed", "families", "removed")  # options of cases that are made
 REAL = ("rod",)  # plants with a recording in examples/data
 ONLY_NEW = (*MADE, "gearbox", "cells_every", "baselines", "answers")  # that an old file has
-NOT_REAL = (*ONLY_NEW, "recordings", "truth", "continued")
+NOT_REAL = (*ONLY_NEW, "recordings", "truth", "continued", "jobs")
 
 
 @click.command("prove", epilog=example("prove --real rod"))

@@ -9,10 +9,10 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 from numpy.typing import ArrayLike
 
@@ -219,7 +219,7 @@ class Gearbox:
             return DEFAULT_SOURCE
         raise InputError(f"{self.file}: {path} is not a value of this gearbox{did_you_mean(path, self.leaves)}")
 
-    def with_values(self, changes: Mapping[str, Any]) -> Gearbox:
+    def with_values(self, changes: Mapping[str, Any]) -> Self:
         """Return a new, validated gearbox with some values changed; sources and priors stay.
 
         Another ``oil.named`` changes the whole oil, another ``bearing.N.designation`` the sizes and constants of that
@@ -258,7 +258,7 @@ class Gearbox:
         definition = _validate(values, file=self.file)
         notes.sources.update(dict.fromkeys(changes, CHANGED_SOURCE))
         given = {leaf for leaf, _ in leaves_of(values) if any(f"{leaf}.".startswith(f"{path}.") for path in changed)}
-        return Gearbox(definition, notes, self.given | given, self.file)
+        return replace(self, definition=definition, notes=notes, given=self.given | given)
 
     @property
     def typical_operation(self) -> tuple[float, float]:

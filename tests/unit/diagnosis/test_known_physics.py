@@ -133,6 +133,11 @@ def test_what_is_known_is_no_candidate_a_second_time(fzg: Gearbox, rides: list[R
     assert any("fan_thermostat" in place for place in changes)  # but it may change
 
 
+def test_other_values_of_a_definition_leave_what_is_known(fzg: Gearbox) -> None:
+    other = corrected_gearbox(fzg, fan(fzg)).with_values({"factors.h_air": 1.1})
+    assert other.factors["h_air"] == 1.1 and any(ON in link.name for link in other.network().links)
+
+
 def test_instruments_and_model_error_are_asked_anew(fzg: Gearbox) -> None:
     (of_fan,) = fan(fzg).findings
     learnt = [of_fan.model_copy(update={"mechanism": name, "grade": "learnt"}) for name in ("shape", "model error")]

@@ -11,7 +11,7 @@ from tests.conftest import RunCli
 
 @pytest.mark.parametrize("other", [
     ["--plant", "own"], ["--seed", "1"], ["--recordings", "."], ["--truth", "."], ["--baselines", "2"],
-    ["--gearbox", "fzg"],
+    ["--gearbox", "fzg"], ["--jobs", "2"],
 ])  # fmt: skip
 def test_real_goes_with_nothing_about_cases(
     other: list[str], run_cli: RunCli, tmp_path: Path, capsys: pytest.CaptureFixture[str]
