@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from diagnosis.candidates.hypotheses import Hypothesis
-from diagnosis.decision.answer import Answer, act_on_the_same, withdraw_claim
+from diagnosis.decision.answer import Answer, act_on_the_same, decide, withdraw_claim
 from diagnosis.decision.posterior import KINDS, Expected, Judged, Posterior
 from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.fit import Experiment, Fit
@@ -39,7 +39,9 @@ from diagnosis.results.result_parts import (
     Fits,
     NotDetectable,
     Ranked,
+    Refuted,
     called,
+    named,
     spoiled_in,
 )
 from diagnosis.setup.inference_setup import InferenceSetup
@@ -115,11 +117,20 @@ def assemble(
 
     best = _best(posterior, answers)
     predicted, holdout, contradicted = judged_by(best)
-    named, much, left_out = _named_alone(posterior, answers) if contradicted else None, False, ""
-    if named is not None and not (alone := judged_by(named))[-1]:  # what has no name does the harm
-        best, (predicted, holdout, contradicted) = named, alone
-        answers = [replace(answer, best=named) for answer in answers]
-        much, left_out = posterior.leaves_much(named), LEFT_OUT
+    single, much, left_out = _named_alone(posterior, answers) if contradicted else None, False, ""
+    if single is not None and not (alone := judged_by(single))[-1]:  # what has no name does the harm
+        best, (predicted, holdout, contradicted) = single, alone
+        answers = [replace(answer, best=single) for answer in answers]
+        much, left_out = posterior.leaves_much(single), LEFT_OUT
+    refuted = None
+    both = posterior.log_e + predicted.holdout_gain
+    if best is not None and posterior.detected and both < posterior.threshold and not faulty:
+        names = " and ".join(named(effect.mechanism, effect.place) for effect in best.effects)
+        refuted = Refuted(names=names, log_e_value=posterior.log_e, log_score_gain=predicted.holdout_gain)
+        posterior = replace(posterior, log_e=both)
+        answers, much, left_out = decide(posterior), False, ""
+        best = _best(posterior, answers)
+        predicted, holdout, contradicted = judged_by(best)
     final = predicted.final
     if contradicted or much:
         answers = [withdraw_claim(answer, posterior.rule) for answer in answers]
@@ -190,6 +201,7 @@ def assemble(
         placebo=posterior.placebo,
         holdout_gain=predicted.holdout_gain,
         contradicted=contradicted,
+        refuted=refuted,
         spoiled=spoiled,
     )  # fmt: skip
 

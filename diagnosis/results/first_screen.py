@@ -111,7 +111,11 @@ def _missing(d: Diagnosis) -> str:
         f" But calibrated, the model is {off[0]:.2f} K off what was {off[1]}: it fits this machine badly, and an "
         "effect may hide in that."
     ) if off[0] > BADLY * d.settings.matters_K + d.noise_K else ""  # fmt: skip
-    return f"Nothing that these data show{where}: {reached}.{doubt}"
+    refuted = (
+        f" What was learnt from speaks for {d.refuted.names} ({d.refuted.log_e_value:.1f} nat), but with it the "
+        f"held-out readings are less probable, by {-d.refuted.log_score_gain:.0f} nat; both count."
+    ) if d.refuted else ""  # fmt: skip
+    return f"Nothing that these data show{where}: {reached}.{refuted}{doubt}"
 
 
 def _cannot_be_fitted(d: Diagnosis) -> bool:

@@ -25,6 +25,7 @@ from diagnosis.results.result_parts import (
     Location,
     NotDetectable,
     Ranked,
+    Refuted,
     error_unit,
     named,
     or_none,
@@ -118,6 +119,8 @@ class Diagnosis:
         Log predictive density of the held-out readings: final model less the calibrated one, [nat]; NaN without any
     contradicted : bool
         True if held-out recordings contradict the findings, see :meth:`Fits.contradict`: none is a claim
+    refuted : Refuted or None
+        What would have been detected without the held-out recordings, if there is anything
     spoiled : mapping of recording to (before, calibrated)
         Tested recordings that calibration made worse by more than noise and what matters, [K]
     faulty : tuple of str
@@ -175,6 +178,7 @@ class Diagnosis:
     placebo: Placebo | None = None
     holdout_gain: float = math.nan
     contradicted: bool = False
+    refuted: Refuted | None = None
     spoiled: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     faulty: tuple[str, ...] = ()
     terms: tuple[Term, ...] = ()
@@ -200,6 +204,7 @@ class Diagnosis:
                         "outside their priors (verdict parameter_error: of such parameters to none); something is "
                         "missing if it exceeds threshold. p_value = exp(-log_e_value), at most 1: a bound on chance "
                         "for an exact model only, no false-alarm rate",
+                "refuted": None if self.refuted is None else asdict(self.refuted),
             },
             "location": [
                 {

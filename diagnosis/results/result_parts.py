@@ -253,6 +253,25 @@ class Errors(NamedTuple):
     after: float
 
 
+@dataclass(frozen=True, kw_only=True)
+class Refuted:
+    """What the recordings learnt from speak for, and the held-out ones against so much that nothing is detected.
+
+    Attributes
+    ----------
+    names : str
+        Of the effects, with their places
+    log_e_value : float
+        Evidence that something is missing, by the recordings learnt from alone, [nat]
+    log_score_gain : float
+        Log predictive density of the held-out readings with it, less that of the calibrated model, [nat]
+    """
+
+    names: str
+    log_e_value: float
+    log_score_gain: float
+
+
 MISSED = 3.0  # times the error of the recordings learnt from, beyond which a held-out one is missed
 
 

@@ -99,6 +99,27 @@ def test_held_out_readings_that_are_predicted_worse_take_the_claim_away(
         assert found.has_correction  # what improves the prediction of the rest goes into the model all the same
 
 
+def test_held_out_readings_count_against_what_was_learnt_from(
+    assembled: Assemble, prepared: Prepared, windage: Judged, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where both together are below the threshold nothing is detected, and the calibrated machine predicts."""
+    posterior = posterior_of(prepared[2], windage, remainder=1.5)
+    claim = Answer(best=windage, effect=windage.effects[0], grade="claim", probability=0.95, joint=0.95)
+    spare = posterior.log_e - posterior.threshold
+    assert spare > 10.0
+    for gain, verdict in ((1.0 - spare, "missing_physics"), (-1.0 - spare, "consistent")):
+        monkeypatch.setattr(predictions, "log_score_gain", lambda *_, gain=gain: gain)
+        found = assembled(posterior, [claim])
+        assert found.verdict == verdict and bool(found.findings) is found.has_correction is (found.refuted is None)
+    assert found.refuted is not None and found.log_e_value == pytest.approx(posterior.threshold - 1.0)
+    assert found.holdout.after == found.holdout.calibrated
+    stored = found.to_dict()["significance"]["refuted"]
+    assert stored == {"names": "windage at oil", "log_e_value": posterior.log_e, "log_score_gain": -1.0 - spare}
+    (missing,) = dict(found.first_screen)["Is something missing?"]
+    assert f"speaks for windage at oil ({posterior.log_e:.1f} nat)" in missing
+    assert f"less probable, by {spare + 1.0:.0f} nat; both count." in missing
+
+
 def test_scorers_read_the_numbers(claimed: Diagnosis, fzg: Gearbox) -> None:
     text = json.dumps(claimed.to_dict(), allow_nan=False)
     answer = read_answer(json.loads(text), fzg)
