@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from diagnosis.decision.answer import decide
+from diagnosis.decision.draughts import best_explained_first
 from diagnosis.decision.infer import infer
 from diagnosis.decision.settings import Settings
-from diagnosis.engine.calibration import calibrate_with_error, recalibrate
+from diagnosis.engine.calibration import calibrate_in_draughts, calibrate_with_error, recalibrate
 from diagnosis.engine.families import candidates_of
 from diagnosis.engine.fit import calibrate
 from diagnosis.engine.known_switches import start_with_switches
@@ -112,9 +113,15 @@ def diagnose(
         others, apart = calibrate_apart(experiment, plain, start)
         progress("calibrating with model error")
         calibration = calibrate_with_error(experiment, others, apart)
+        candidates, rival = candidates_of(setup, experiment), -np.inf
+        in_draughts = calibrate_in_draughts(calibration)
+        if in_draughts is not None:
+            progress("comparing still air and draughts")
+            calibration, other = best_explained_first([calibration, in_draughts], candidates)
+            rival = other.chosen.log_evidence
         weigh = partial(
-            infer, candidates=candidates_of(setup, experiment), settings=settings, progress=progress,
-            candidates_in=partial(candidates_of, setup),
+            infer, candidates=candidates, settings=settings, progress=progress,
+            candidates_in=partial(candidates_of, setup), rival=rival,
         )  # fmt: skip
         outside = outside_of(setup, experiment)
         posterior = weigh(calibration, outside=outside)

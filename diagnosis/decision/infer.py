@@ -61,7 +61,8 @@ WORTH, WORTH_SHARE = 1.0, 0.1  # nats, and share of the best, from which a candi
 
 def infer(
     calibration: Calibration, candidates: Sequence[Hypothesis], settings: Settings, *,
-    outside: Sequence[Hypothesis] = (), candidates_in: CandidatesIn = lambda _: (), progress: Progress = silent,
+    outside: Sequence[Hypothesis] = (), candidates_in: CandidatesIn = lambda _: (), rival: float = -np.inf,
+    progress: Progress = silent,
 ) -> Posterior:  # fmt: skip
     """Weigh all explanations.
 
@@ -71,6 +72,8 @@ def infer(
         Unknown heats, judged where something is missing
     candidates_in : callable
         Gives the candidates of an experiment in which a baseline is tested
+    rival : float
+        Log evidence of the machine without an effect in other random heat, which an effect has to exceed too
     progress : callable
         Told what is being done
     """
@@ -112,7 +115,8 @@ def infer(
     every = (*judged.values(), *pairs)
     parameters = [one.weight for one in every if one.of_parameters]
     effects = [one.weight for one in every if sum(effect.term is not None for effect in one.effects) == 1]
-    log_e = log_sum(effects) - log_sum([gained, *parameters])
+    nothing = max(gained, rival - calibration.chosen.log_evidence)
+    log_e = log_sum(effects) - log_sum([nothing, *parameters])
     threshold = max(detection, least)
     missing = log_e > threshold
     unknown = _unknown(calibration, error_class, outside) if missing else []
@@ -120,7 +124,7 @@ def infer(
         nothing=Judged(effects=(), log_bayes=0.0, error_class=chosen.error_class, fit=base),
         judged=tuple(replace(one, log_bayes=one.log_bayes - gained) for one in (*every, *unknown)),
         log_e=log_e,
-        log_parameter=log_sum(parameters) - gained,
+        log_parameter=log_sum(parameters) - nothing,
         threshold=threshold,
         class_threshold=of_class,
         rule=rule(),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 
@@ -15,12 +15,13 @@ from diagnosis.engine.metric import Metric, leading_directions
 from diagnosis.engine.model_error import ModelError
 from diagnosis.engine.sessions import fit_over_sessions, most_deviation, over_sessions
 from diagnosis.engine.set_apart import without_channels
-from diagnosis.forward.whitening import RandomHeat, Whitening
+from diagnosis.forward.whitening import AS_ASSUMED, RandomHeat, Whitening
 from models.base.types import Array
 
 TURNS = 3  # with the chosen class: point, columns of model error and deviation between sessions settle together
 LONGEST = 16.0  # times as long as assumed, random heats may last where only the form of the laws is known
 WORTH = 1.0  # nats that another random heat has to bring
+DRAUGHT, DRAUGHT_WORTH = 0.05, 5.0  # of all heat to the surroundings, at most; nats that draughts have to bring
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -95,20 +96,17 @@ class NearReadings:
         gram = self.gram(one, z)
         return float(np.log(one.prior)) + over_sessions(gram, self.experiment, range(gram.count)).log_evidence
 
-    def likely_random_heat(self, one: ErrorClass, z: Array) -> RandomHeat:
-        """Factors on the assumed random heats that make the readings most probable with model error of a class.
+    def evidence_of(self, one: ErrorClass, z: Array) -> Callable[[RandomHeat], float]:
+        """Log evidence of random heats with model error of a class, where everything is linearised.
 
-        They are halved, and made to last twice as long where no more than the form of the laws is known, by the step
-        that brings most evidence as long as one does. They are never more than assumed, and with geometry they do not
-        last longer: an effect of hours would pass for random. The evidence of a noise is that of its innovations
-        (Harvey 1989, section 3.4; see :mod:`diagnosis.forward.whitening`).
+        It is that of the innovations (Harvey 1989, section 3.4; see :mod:`diagnosis.forward.whitening`).
 
         Parameters
         ----------
         z : Array, shape (unknowns,)
             Where everything is linearised
         """
-        model, noise, directions = self.experiment.machine.model, self.experiment.noise, self.directions(one)
+        model, directions = self.experiment.machine.model, self.directions(one)
         raw = [
             np.concatenate([part.point.residual_without_error[:, :, None], self.experiment.columns(part.point, z),
                             self.error.combined_responses(part.point, directions)], axis=2)
@@ -116,24 +114,46 @@ class NearReadings:
         ]  # fmt: skip
 
         @cache
-        def log_evidence(factors: RandomHeat) -> float:
+        def log_evidence(times: RandomHeat) -> float:
             parts, errors = [], []
-            for part, assumed, columns in zip(self.parts, noise, raw, strict=True):
-                there = Whitening(model, part.point.trajectory, part.point.sensors, assumed.with_random_heat(factors))
+            for part, noise, columns in zip(
+                self.parts, self.experiment.with_random_heat(times).noise, raw, strict=True
+            ):
+                there = Whitening(model, part.point.trajectory, part.point.sensors, noise)
                 residual, known, error = np.split(there(columns), [1, 1 + len(z)], axis=1)
                 parts.append(Linear(point=part.point, filter=there, residual=residual[:, 0], columns=known))
                 errors.append(error)
             gram = gram_of(parts, whitened_base(parts, z, errors))
             return over_sessions(gram, self.experiment, range(gram.count)).log_evidence
 
-        longest = LONGEST if noise[0].goes_with_capacity else 1.0
-        best = RandomHeat()
+        return log_evidence
+
+    def likely_random_heat(self, one: ErrorClass, z: Array) -> RandomHeat:
+        """Random heats that make the readings most probable with model error of a class, without draughts.
+
+        Parameters
+        ----------
+        z : Array, shape (unknowns,)
+            Where everything is linearised
+        """
+        return self.most_probable(self.evidence_of(one, z), AS_ASSUMED)
+
+    def most_probable(self, log_evidence: Callable[[RandomHeat], float], start: RandomHeat) -> RandomHeat:
+        """Random heats with the most evidence, searched for from a start; without draughts there, without.
+
+        They are halved, and made to last twice as long where no more than the form of the laws is known, by the step
+        that brings most evidence as long as one does. They are never more than assumed, and with geometry they do not
+        last longer: an effect of hours would pass for random.
+        """
+        longest = LONGEST if self.experiment.noise[0].goes_with_capacity else 1.0
+        best = start
         while True:
             tried = [replace(best, **{name: times * getattr(best, name)})
-                     for name in ("heat", "wander", "time") for times in (0.5, 2.0)]  # fmt: skip
+                     for name in ("heat", "wander", "time", "draught") for times in (0.5, 2.0)]  # fmt: skip
             # Less heat that lasts longer does nearly the same: both change at once, or neither would alone.
             tried += [replace(best, heat=times * best.heat, time=best.time / times) for times in (0.5, 2.0)]
-            able = [one for one in tried if max(one.heat, one.wander) <= 1.0 <= one.time <= longest]
+            able = [one for one in tried
+                    if max(one.heat, one.wander, one.draught / DRAUGHT) <= 1.0 <= one.time <= longest]  # fmt: skip
             other = max(able, key=log_evidence)
             if log_evidence(other) < log_evidence(best) + WORTH:
                 return best
@@ -264,11 +284,37 @@ def _calibrated(experiment: Experiment, error: ModelError, start: Fit) -> Calibr
     first = [NearReadings.of(experiment, error, one).fitted(widest, one) for one in (start, middles)]
     fit = max(first, key=lambda one: one.log_evidence).fit
     near = NearReadings.of(experiment, error, fit)
-    experiment = experiment.with_random_heat(near.likely_random_heat(widest, fit.z))
+    return _with_random_heat(experiment.with_random_heat(near.likely_random_heat(widest, fit.z)), error, fit)
+
+
+def _with_random_heat(experiment: Experiment, error: ModelError, fit: Fit) -> Calibration:
+    widest = widest_class()
     fit = NearReadings.of(experiment, error, fit).fitted(widest, fit, iterations=ITERATIONS).fit
     near = NearReadings.of(experiment, error, fit)
     most = most_deviation(near.gram(widest, fit.z), experiment)
     return _settled(replace(near, experiment=replace(near.experiment, most_deviation=most)), fit)
+
+
+def calibrate_in_draughts(calibration: Calibration) -> Calibration | None:
+    """The same machine where draughts change the heat of all parts to the surroundings by one random share.
+
+    None if they bring less than :data:`DRAUGHT_WORTH`, or channels were set apart: a broken sensor is no draught.
+
+    Raises
+    ------
+    ArithmeticError
+        If the simulation has no solution there.
+    """
+    if calibration.of_others is not None:
+        return None
+    near, fit, widest = calibration.near, calibration.fit, widest_class()
+    log_evidence, has = near.evidence_of(widest, fit.z), near.experiment.random_heat
+    times = near.most_probable(log_evidence, replace(has, draught=DRAUGHT))
+    if log_evidence(times) < log_evidence(has) + DRAUGHT_WORTH:
+        return None
+    free = replace(near.experiment.with_random_heat(times), most_deviation=np.inf)
+    found = _with_random_heat(free, near.error, fit)
+    return found if found.chosen.log_evidence > calibration.chosen.log_evidence else None
 
 
 def recalibrate(calibration: Calibration, fit: Fit) -> Calibration:

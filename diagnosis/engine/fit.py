@@ -55,7 +55,7 @@ class Experiment:
     metric : Metric
         In which residuals are judged; of whitened readings under `filters`
     random_heat : RandomHeat
-        Factors on those assumed, which `noise` has
+        How much of it `noise` has
     most_deviation : float
         Largest one that a session may have from the others, in prior standard deviations
     """
@@ -290,8 +290,11 @@ class Experiment:
         return replace(self, filters=tuple(part.filter for part in parts))
 
     def with_random_heat(self, times: RandomHeat) -> Experiment:
-        """Experiment with other random heats than assumed, without filters."""
-        noise = tuple(one.with_random_heat(times) for one in self.noise)
+        """Experiment with other random heats than it has, without filters; `times` are factors on those assumed."""
+        has = self.random_heat
+        further = RandomHeat(heat=times.heat / has.heat, wander=times.wander / has.wander, time=times.time / has.time,
+                             draught=times.draught)  # fmt: skip
+        noise = tuple(one.with_random_heat(further) for one in self.noise)
         return replace(self, noise=noise, random_heat=times, filters=None)
 
     def _errors(self, at: Linearised, step: Array) -> Sequence[ErrorCourse | None] | None:

@@ -3,7 +3,8 @@
 A free-running residual wanders for hours: one forgotten watt in the oil shows in every later row. Judged row by row it
 looks like overwhelming evidence. The noise model therefore holds what a real gearbox always has besides its model: a
 random heat in every part (an Ornstein-Uhlenbeck process, the *structural floor*; larger where much heat goes to the
-surroundings, whose draughts come and go), unknown start temperatures, and white sensor noise. A Kalman filter of the
+surroundings), draughts that change the heat of all parts to their surroundings by one random share, unknown start
+temperatures, and white sensor noise. A Kalman filter of the
 linearised network gives the innovations of any signal under this noise; the same filter applied to a derivative gives
 that derivative in the same, whitened units.
 
@@ -33,11 +34,20 @@ JUMP_SHARE = 0.3  # of a change within one interval: whether it came early or la
 
 @dataclass(frozen=True, kw_only=True)
 class RandomHeat:
-    """Factors on assumed random heats: those in the parts, the share of what surroundings take, correlation time."""
+    """How much random heat there is.
+
+    Attributes
+    ----------
+    heat, wander, time : float
+        Factors on what is assumed in the parts, of what surroundings take from each, and of the correlation time
+    draught : float
+        Random share of all heat to the surroundings, as :attr:`Noise.draught`
+    """
 
     heat: float = 1.0
     wander: float = 1.0
     time: float = 1.0
+    draught: float = 0.0
 
 
 AS_ASSUMED = RandomHeat()
@@ -62,7 +72,9 @@ class Noise:
     start_sd : Array, shape (parts,)
         Uncertainty of the start temperatures, [K]
     wander : float
-        Random share of the heat that a part gives to its surroundings, [-]
+        Random share of the heat that a part gives to its surroundings, of each part by itself, [-]
+    draught : float
+        Random share of the heat that all parts give to their surroundings together, [-]
     capacity : float
         Sum of the heat capacities that `heat_sd` is given for, [J/K]: it goes with them, else the floor would decide on
         the size of a gearbox whose recordings determine ratios only; 0 where it is fixed
@@ -75,6 +87,7 @@ class Noise:
     heat_time: float
     start_sd: Array
     wander: float = 0.0
+    draught: float = 0.0
     capacity: float = 0.0
 
     @property
@@ -83,9 +96,9 @@ class Noise:
         return self.capacity > 0.0
 
     def with_random_heat(self, times: RandomHeat) -> Noise:
-        """Noise with its random heats multiplied."""
+        """Noise with its random heats multiplied, and draughts."""
         return replace(self, heat_sd=self.heat_sd * times.heat, wander=self.wander * times.wander,
-                       heat_time=self.heat_time * times.time)  # fmt: skip
+                       heat_time=self.heat_time * times.time, draught=times.draught)  # fmt: skip
 
 
 class Whitening:
@@ -97,7 +110,7 @@ class Whitening:
             share = float(trajectory.capacities.sum()) / noise.capacity
             noise = replace(noise, heat_sd=noise.heat_sd * share)
         shaken = np.flatnonzero(noise.heat_sd > 0.0)
-        size, steps = n + len(shaken), piece.steps
+        size, steps = n + len(shaken) + (noise.draught > 0.0), piece.steps
         count = len(steps)
         rho = np.exp(-steps / noise.heat_time)
         # The states are of variance 1; how much heat they are goes with the heat that the surroundings take.
@@ -105,7 +118,10 @@ class Whitening:
         per_capacity = trajectory.gain[:, :, shaken] * (heat_sd / trajectory.capacities[shaken])[:, None, :]
         transition = np.zeros((count, size, size))
         transition[:, :n, :n] = trajectory.decay
-        transition[:, :n, n:] = per_capacity
+        transition[:, :n, n : n + len(shaken)] = per_capacity
+        if noise.draught > 0.0:
+            rates = noise.draught * _from_surroundings(model, trajectory) / trajectory.capacities
+            transition[:, :n, -1] = np.einsum("kij,kj->ki", trajectory.gain[:, :, : model.n], rates)
         transition[:, range(n, size), range(n, size)] = rho[:, None]
         renewed = np.zeros((count, size, size))
         renewed[:, range(n, size), range(n, size)] = 1.0 - rho[:, None] ** 2
@@ -171,10 +187,21 @@ class Whitening:
 
 def _to_surroundings(model: NetworkOnGrid, trajectory: Trajectory) -> Array:
     """Heat that links to boundaries take from every part, or bring, shape (K, parts), [W]."""
+    flows, into = _outside(model, trajectory)
+    return np.asarray(np.sqrt(np.square(flows) @ np.abs(into)))
+
+
+def _from_surroundings(model: NetworkOnGrid, trajectory: Trajectory) -> Array:
+    """Heat that links to boundaries bring to every part, negative where they take it, shape (K, parts), [W]."""
+    flows, into = _outside(model, trajectory)
+    return flows @ into
+
+
+def _outside(model: NetworkOnGrid, trajectory: Trajectory) -> tuple[Array, Array]:
+    """Heat flows through links to boundaries, shape (K, links), [W], and where they go, shape (links, parts)."""
     outside = np.abs(model.to_parts.sum(axis=1)) > 0.5  # between parts, what one loses the other gains
     balance = trajectory.balance
-    flows = np.square(balance.conductances * balance.differences)[:, outside]
-    return np.asarray(np.sqrt(flows @ np.abs(model.to_parts[outside])))
+    return (balance.conductances * balance.differences)[:, outside], model.to_parts[outside]
 
 
 def reading_variance(model: NetworkOnGrid, trajectory: Trajectory, sensors: Sensors, noise: Noise) -> Array:
