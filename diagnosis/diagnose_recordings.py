@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from diagnosis.decision.answer import decide
-from diagnosis.decision.draughts import best_explained_first
+from diagnosis.decision.draughts import most_probable, worth_weighing
 from diagnosis.decision.infer import infer
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import calibrate_in_draughts, calibrate_with_error, recalibrate
@@ -113,24 +113,24 @@ def diagnose(
         others, apart = calibrate_apart(experiment, plain, start)
         progress("calibrating with model error")
         calibration = calibrate_with_error(experiment, others, apart)
-        candidates, rival = candidates_of(setup, experiment), -np.inf
-        in_draughts = calibrate_in_draughts(calibration)
-        if in_draughts is not None:
-            progress("comparing still air and draughts")
-            calibration, other = best_explained_first([calibration, in_draughts], candidates)
-            rival = other.chosen.log_evidence
+        candidates, outside = candidates_of(setup, experiment), outside_of(setup, experiment)
         weigh = partial(
             infer, candidates=candidates, settings=settings, progress=progress,
-            candidates_in=partial(candidates_of, setup), rival=rival,
+            candidates_in=partial(candidates_of, setup),
         )  # fmt: skip
-        outside = outside_of(setup, experiment)
-        posterior = weigh(calibration, outside=outside)
+        both, rival = [calibration], -np.inf
+        if (in_draughts := calibrate_in_draughts(calibration)) is not None:
+            progress("comparing still air and draughts")
+            rival = in_draughts.chosen.log_evidence
+            both = worth_weighing([calibration, in_draughts], candidates)
+        weighed = [(one, weigh(one, outside=outside, rival=rival)) for one in both]
+        calibration, posterior = most_probable(weighed)
         if posterior.elsewhere is not None:
             progress("calibrating again from a better start that was seen")
             again = recalibrate(calibration, posterior.elsewhere)
             if again.chosen.log_evidence > calibration.chosen.log_evidence:
                 calibration = again
-                posterior = weigh(calibration, outside=outside)
+                posterior = weigh(calibration, outside=outside, rival=rival)
         faulty, rest = faulty_channels(posterior, apart), None
         if faulty and calibration.of_others is not None:
             progress(f"looking at the machine without {', '.join(apart)}")

@@ -7,7 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.engine.calibration import Calibration, NearReadings, calibrate_with_error, recalibrate
+from diagnosis.engine.calibration import (
+    Calibration,
+    NearReadings,
+    calibrate_in_draughts,
+    calibrate_with_error,
+    recalibrate,
+)
 from diagnosis.engine.fit import Experiment, calibrate
 from diagnosis.engine.learnt import error_classes, widest_class
 from diagnosis.engine.model_error import ModelError
@@ -71,17 +77,20 @@ def test_another_class_starts_at_the_same_point(found: Calibration) -> None:
     )
 
 
-def shaken(fzg: Gearbox, *, times: float, lasting: float = 1.0) -> Experiment:
-    """A machine with random heats in its parts: so many times as much as is assumed, and as lasting."""
+def shaken(fzg: Gearbox, *, times: float, lasting: float = 1.0, draught: float = 0.0) -> Experiment:
+    """A machine with random heats in its parts: so many times as much as is assumed, and as lasting; and draughts."""
     train = recorded(fzg, "train", hours=6.0)
     _, experiment = prepare_experiment(fzg, [train], [train])
     point, noise = experiment.point(0, np.zeros(len(experiment.unknowns))), experiment.noise[0]
     rng = np.random.default_rng(1)
     rho = np.exp(-point.trajectory.piece.steps / noise.heat_time / lasting)
     heat = np.zeros((len(rho), point.trajectory.decay.shape[-1], 1))
-    now = rng.standard_normal(len(noise.heat_sd))
+    model, balance = experiment.machine.model, point.trajectory.balance
+    outside = np.abs(model.to_parts.sum(axis=1)) > 0.5
+    from_air = (balance.conductances * balance.differences)[:, outside] @ model.to_parts[outside]
+    now = rng.standard_normal(model.n + 1)
     for k, kept in enumerate(rho):
-        heat[k, : len(now), 0] = times * noise.heat_sd * now
+        heat[k, : model.n, 0] = times * noise.heat_sd * now[:-1] + draught * from_air[k] * now[-1]
         now = kept * now + np.sqrt(1.0 - kept**2) * rng.standard_normal(len(now))
     moved = point.heated(heat, np.zeros((len(rho), 1)))[:, :, 0]
     return with_measured(experiment, experiment.pieces[0].measured + moved)
@@ -105,3 +114,26 @@ def test_random_heats_are_never_raised_and_last_longer_without_geometry_alone(fz
     capacity = float(experiment.point(0, np.zeros(len(experiment.unknowns))).trajectory.capacities.sum())
     free = likely(replace(experiment, noise=tuple(replace(one, capacity=capacity) for one in experiment.noise)))
     assert free.time > 1.0 and max(free.heat, free.wander) <= 1.0
+
+
+def test_draughts_are_assumed_where_the_readings_show_them(fzg: Gearbox, found: Calibration) -> None:
+    """They change the heat of all parts to the surroundings by one share, 5 % at most."""
+    assert calibrate_in_draughts(found) is None
+    experiment = shaken(fzg, times=0.0, draught=0.04)
+    still = calibrate_with_error(experiment, calibrate(experiment))
+    there = calibrate_in_draughts(still)
+    assert there is not None and 0.01 < there.near.experiment.random_heat.draught <= 0.05
+    assert there.chosen.log_evidence > still.chosen.log_evidence + 5.0
+    assert there.near.experiment.noise[0].draught == there.near.experiment.random_heat.draught
+    assert calibrate_in_draughts(replace(still, of_others=still)) is None  # a broken sensor is no draught
+
+
+def test_random_heats_are_factors_on_what_is_assumed(found: Calibration) -> None:
+    """Whatever the experiment has already."""
+    times = RandomHeat(heat=0.25, wander=0.5, draught=0.02)
+    again = found.near.experiment.with_random_heat(RandomHeat(heat=0.5, wander=0.125, time=2.0)).with_random_heat(times)
+    back = found.near.experiment.with_random_heat(times)
+    assert again.random_heat == back.random_heat == times
+    for one, other in zip(again.noise, back.noise, strict=True):
+        np.testing.assert_array_equal(one.heat_sd, other.heat_sd)
+        assert (one.wander, one.heat_time, one.draught) == (other.wander, other.heat_time, 0.02)

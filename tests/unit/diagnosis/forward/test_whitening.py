@@ -14,31 +14,33 @@ from diagnosis.forward.whitening import Noise, Whitening, reading_variance
 from tests.unit.diagnosis.inference_example import CHANNELS, with_measured
 
 
-@pytest.mark.parametrize("wander", [0.0, 0.3])
+@pytest.mark.parametrize(("wander", "draught"), [(0.0, 0.0), (0.3, 0.0), (0.0, 0.2)])
 def test_innovations_of_the_noise_are_white(
-    model: NetworkOnGrid, piece: Piece, experiment: Experiment, wander: float
+    model: NetworkOnGrid, piece: Piece, experiment: Experiment, wander: float, draught: float
 ) -> None:
     """Noise drawn from the noise model itself comes out as independent standard normal numbers."""
     rng = np.random.default_rng(1)
     part = experiment.point(0, np.zeros(len(experiment.unknowns)))
     noise = replace(
         experiment.noise[0], heat_sd=np.where(model.capacities(model.start) > 100.0, 3.0, 0.0), heat_time=400.0,
-        wander=wander,
+        wander=wander, draught=draught,
     )  # fmt: skip
-    to_air = np.zeros((len(piece.steps), model.n))
+    to_air, from_air = np.zeros((2, len(piece.steps), model.n))
     for index, link in enumerate(model.network.links):
         inside = [model.parts.index(node) for node in link.nodes if node in model.parts]
         if len(inside) == 1:
             flow = part.trajectory.balance.conductances[:, index] * part.trajectory.balance.differences[:, index]
             to_air[:, inside[0]] += np.square(flow)
+            from_air[:, inside[0]] += flow if link.nodes[1] in model.parts else -flow
     heat_sd = np.where(noise.heat_sd > 0.0, np.sqrt(noise.heat_sd**2 + wander**2 * to_air), 0.0)
     assert wander == 0.0 or heat_sd.max() > 2.0 * noise.heat_sd.max()
+    assert draught == 0.0 or draught * np.abs(from_air).max() > 2.0 * noise.heat_sd.max()
     whitening = Whitening(model, part.trajectory, part.sensors, noise)
     steps, draws = piece.steps, 40
     heat = np.empty((len(steps), model.n, draws))
-    now = rng.normal(size=(model.n, draws))
+    now = rng.normal(size=(model.n + 1, draws))  # the last one is the draught
     for k, h in enumerate(steps):
-        heat[k] = heat_sd[k, :, None] * now
+        heat[k] = heat_sd[k, :, None] * now[:-1] + draught * from_air[k, :, None] * now[-1]
         rho = np.exp(-h / noise.heat_time)
         now = rho * now + np.sqrt(1.0 - rho**2) * rng.normal(size=now.shape)
     T = part.trajectory.response(heat, noise.start_sd[:, None] * rng.normal(size=(model.n, draws)))
