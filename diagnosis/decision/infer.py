@@ -115,8 +115,8 @@ def infer(
     every = (*judged.values(), *pairs)
     parameters = [one.weight for one in every if one.of_parameters]
     effects = [one.weight for one in every if sum(effect.term is not None for effect in one.effects) == 1]
-    nothing = max(gained, rival - calibration.chosen.log_evidence)
-    log_e = log_sum(effects) - log_sum([nothing, *parameters])
+    ahead = max(rival - calibration.chosen.log_evidence - gained, 0.0)
+    log_e = log_sum(effects) - log_sum([gained + ahead, *parameters])
     threshold = max(detection, least)
     missing = log_e > threshold
     unknown = _unknown(calibration, error_class, outside) if missing else []
@@ -124,7 +124,8 @@ def infer(
         nothing=Judged(effects=(), log_bayes=0.0, error_class=chosen.error_class, fit=base),
         judged=tuple(replace(one, log_bayes=one.log_bayes - gained) for one in (*every, *unknown)),
         log_e=log_e,
-        log_parameter=log_sum(parameters) - nothing,
+        log_parameter=log_sum(parameters) - gained - ahead,
+        rival_ahead=ahead,
         threshold=threshold,
         class_threshold=of_class,
         rule=rule(),

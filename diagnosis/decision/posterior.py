@@ -235,6 +235,8 @@ class Posterior:
     threshold, class_threshold : float
         From which something is missing, [nat]; that of the class of model error, from which a parameter is outside its
         prior and a further effect competes
+    rival_ahead : float
+        What the machine without an effect has more in other random heat, which is off `log_e`, [nat]
     settings : Settings
         As asked for
     error_class : str
@@ -259,6 +261,7 @@ class Posterior:
     class_threshold: float
     rule: Rule
     log_parameter: float = -np.inf
+    rival_ahead: float = 0.0
     likeness: Likeness = Likeness(labels=(), cosines=np.zeros((0, 0)))
     settings: Settings = field(default_factory=Settings)
     error_class: str = ""

@@ -201,6 +201,7 @@ def assemble(
         placebo=posterior.placebo,
         holdout_gain=predicted.holdout_gain,
         contradicted=contradicted,
+        draughts_ahead=posterior.rival_ahead,
         refuted=refuted,
         spoiled=spoiled,
     )  # fmt: skip
@@ -373,9 +374,10 @@ def _floor(setup: InferenceSetup, factors: RandomHeat) -> str:
     if setup.gearbox.is_parametric:  # watts are known but for a common factor
         share = PARAMETRIC_FRACTION
         text += f"; of a part of little heat capacity {factors.heat * PARAMETRIC_K:.2g} K"
-    draughts, minutes = 100.0 * factors.wander * WANDER, factors.time * HEAT_TIME_S / 60.0
+    together = f", and draughts of {100.0 * factors.draught:.2g} % of all of it" if factors.draught else ""
     return (f"random heat of {100.0 * factors.heat * share:.2g} % {text}; "
-            f"of {draughts:.2g} % of the heat to the surroundings; over {minutes:.0f} min")  # fmt: skip
+            f"of {100.0 * factors.wander * WANDER:.2g} % of the heat of each to the surroundings{together}; "
+            f"over {factors.time * HEAT_TIME_S / 60.0:.0f} min")  # fmt: skip
 
 
 # ---------------------------------------------------------------------- fits and courses

@@ -202,8 +202,8 @@ def _how_sure(d: Diagnosis) -> tuple[str, ...]:
         lines.append(
             f"Model error assumed: class {d.error_class}{hides if d.error_class == widest_class().name else ''}."
         )
-    if d.scaled_error and d.log_e_value > d.threshold:
-        lines.append(robustness_told(d.scaled_error))
+    if d.log_e_value > d.threshold:
+        lines += _against_others(d)
     lines += _sessions_told(d)
     far = sorted((c for c in d.calibration if abs(c.shift_in_sd) > FAR_SD), key=lambda c: -abs(c.shift_in_sd))
     if far:
@@ -214,6 +214,19 @@ def _how_sure(d: Diagnosis) -> tuple[str, ...]:
     if d.remaining_note:
         lines.append(f"Remaining: {d.remaining_note}")
     return tuple(lines)
+
+
+def _against_others(d: Diagnosis) -> list[str]:
+    """The evidence against still air, and with model error of other sizes."""
+    lines = []
+    if d.draughts_ahead > 0.0:
+        lines.append(
+            f"Against the machine in still air it is {d.log_e_value + d.draughts_ahead:.1f} nat; without an effect "
+            f"draughts are more probable, by {d.draughts_ahead:.1f} nat."
+        )
+    if d.scaled_error:
+        lines.append(robustness_told(d.scaled_error))
+    return lines
 
 
 def _sessions_told(d: Diagnosis) -> list[str]:

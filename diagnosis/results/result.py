@@ -119,6 +119,8 @@ class Diagnosis:
         Log predictive density of the held-out readings: final model less the calibrated one, [nat]; NaN without any
     contradicted : bool
         True if held-out recordings contradict the findings, see :meth:`Fits.contradict`: none is a claim
+    draughts_ahead : float
+        What the machine without an effect has more in draughts than in still air, which is off `log_e_value`, [nat]
     refuted : Refuted or None
         What would have been detected without the held-out recordings, if there is anything
     spoiled : mapping of recording to (before, calibrated)
@@ -178,6 +180,7 @@ class Diagnosis:
     placebo: Placebo | None = None
     holdout_gain: float = math.nan
     contradicted: bool = False
+    draughts_ahead: float = 0.0
     refuted: Refuted | None = None
     spoiled: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     faulty: tuple[str, ...] = ()
@@ -204,6 +207,7 @@ class Diagnosis:
                         "outside their priors (verdict parameter_error: of such parameters to none); something is "
                         "missing if it exceeds threshold. p_value = exp(-log_e_value), at most 1: a bound on chance "
                         "for an exact model only, no false-alarm rate",
+                "draughts_ahead": self.draughts_ahead,
                 "refuted": None if self.refuted is None else asdict(self.refuted),
             },
             "location": [

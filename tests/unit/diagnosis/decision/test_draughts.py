@@ -73,4 +73,5 @@ def test_a_change_of_the_cooling_is_no_draught(
     ]
     calibration, found = most_probable(weighed)
     assert calibration is still and found.detected and found.explanations[0].names == ("air_cooling",)
-    assert alone.log_e - found.log_e == pytest.approx(ahead, abs=0.5)  # what counts is beyond the draughts
+    assert found.rival_ahead == pytest.approx(ahead, abs=0.5)
+    assert alone.log_e - found.log_e == pytest.approx(found.rival_ahead, abs=0.5)  # what counts is beyond the draughts

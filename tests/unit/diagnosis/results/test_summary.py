@@ -40,6 +40,13 @@ def test_a_baseline_that_raises_the_threshold_is_told_with_it() -> None:
     assert "needed (false-alarm rate of 5 % asked for)" in told(little, "Is something missing?")
 
 
+def test_evidence_against_still_air_is_told_where_draughts_are_more_probable() -> None:
+    line = "Against the machine in still air it is 48.8 nat; without an effect draughts are more probable, by 7.5 nat."
+    assert line in told(replace(missing_physics(), draughts_ahead=7.5), "How sure?")
+    assert "draughts" not in told(missing_physics(), "How sure?")
+    assert "draughts" not in told(replace(consistent(), draughts_ahead=7.5), "How sure?")
+
+
 def test_a_diagnosis_of_the_loss_alone_has_a_summary() -> None:
     """Only losses were measured in the rows that count: no temperature has an error."""
     nan = replace(consistent().train, before=math.nan, calibrated=math.nan, found=math.nan, after=math.nan)
