@@ -103,10 +103,13 @@ def assemble(
     faulty = () if others is None else others.channels
     counting = [name for name in setup.channels if name not in faulty]
 
+    draught = calibration.near.experiment.random_heat.draught
+    held_out = held_out_experiment(setup, experiment).with_random_heat(RandomHeat(draught=draught))
+
     def judged_by(best: Judged | None) -> tuple[Predicted, Fits, bool]:
         """Predictions by an explanation, and whether the held-out recordings contradict it."""
         predicted = predict_recordings(
-            experiment, held_out_experiment(setup, experiment), plain=plain,
+            experiment, held_out, plain=plain,
             found=_final(best, plain, faulty),
             explanation=None if faulty else best or posterior.nothing, near=calibration.near, counting=counting,
             noise_K=setup.noise_K,

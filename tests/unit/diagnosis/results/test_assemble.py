@@ -12,16 +12,18 @@ import pytest
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.answer import Answer
 from diagnosis.decision.posterior import Expected, Judged, Placebo
+from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.families import candidates_of
-from diagnosis.engine.fit import Fit
+from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.learnt import error_classes, rule
 from diagnosis.engine.refit import with_candidate
 from diagnosis.engine.unknown import NetworkParameter
+from diagnosis.forward.whitening import RandomHeat
 from diagnosis.proof.scoring.answers import read_answer
 from diagnosis.report.page import page
 from diagnosis.report.write import correction_of
 from diagnosis.results import predictions
-from diagnosis.results.assemble import _distinct, _remaining
+from diagnosis.results.assemble import _distinct, _remaining, assemble
 from diagnosis.results.findings import change_of, estimates_of
 from diagnosis.results.result import Diagnosis
 from models.assembly.gearbox import Gearbox
@@ -118,6 +120,27 @@ def test_held_out_readings_count_against_what_was_learnt_from(
     (missing,) = dict(found.first_screen)["Is something missing?"]
     assert f"speaks for windage at oil ({posterior.log_e:.1f} nat)" in missing
     assert f"less probable, by {spare + 1.0:.0f} nat; both count." in missing
+
+
+def test_held_out_readings_are_judged_in_the_draughts_of_the_machine(
+    prepared: Prepared, calibration: Calibration, windage: Judged, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    setup, experiment, plain = prepared
+    near, judged_in = calibration.near, []
+
+    def gain(_: Fit, __: Fit, held_out: Experiment, ___: object) -> float:
+        judged_in.append(held_out.noise[0])
+        return 0.0
+
+    monkeypatch.setattr(predictions, "log_score_gain", gain)
+    for draught in (0.0, 0.03):
+        there = replace(near, experiment=near.experiment.with_random_heat(RandomHeat(heat=0.25, draught=draught)))
+        found = assemble(setup, experiment, posterior_of(plain, windage), [], plain=plain,
+                         calibration=replace(calibration, near=there))  # fmt: skip
+        assert ("draughts of 3 % of all of it" in found.floor) is (draught > 0.0)
+    still, draughty = judged_in
+    assert (still.draught, draughty.draught) == (0.0, 0.03)
+    np.testing.assert_array_equal(draughty.heat_sd, still.heat_sd)  # as assumed
 
 
 def test_scorers_read_the_numbers(claimed: Diagnosis, fzg: Gearbox) -> None:
