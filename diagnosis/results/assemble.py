@@ -54,6 +54,7 @@ from models.terms.term import Term
 ENOUGH_VISIBLE = 0.1  # of the effects that were asked for, for a "consistent" that means something
 MOST_RANKED = 500
 PROBABLY = 0.5
+CONFIRMED = 1.0  # nat that held-out readings have to bring, where model error is large, for a claim that always acts
 LEFT_OUT = "; a second effect, without a name, was fitted too and is left out: the held-out recordings contradict it"
 
 
@@ -115,7 +116,10 @@ def assemble(
             noise_K=setup.noise_K,
         )  # fmt: skip
         holdout = _fits(setup, predicted.holdout, counting)
-        against = holdout.contradict(predicted.holdout_gain, setup.noise_K, posterior.class_threshold)
+        gain = predicted.holdout_gain
+        against = holdout.contradict(gain, setup.noise_K, posterior.class_threshold)
+        if best is not None and best.error_class.is_large and all(one.how == "always" for one in best.effects):
+            against |= gain < CONFIRMED
         return predicted, holdout, against and bool(answers) and not faulty
 
     best = _best(posterior, answers)

@@ -274,8 +274,11 @@ def _how_much_better(d: Diagnosis) -> tuple[str, ...]:
         nat = f"{abs(d.holdout_gain):.0f} nat" if abs(d.holdout_gain) >= 1.0 else "less than one nat"
         lines.append(f"Held-out readings are predicted {way} by the calibrated model, by {nat} of log score")
     if d.contradicted:
-        by = "less probable readings" if d.holdout_gain < -d.further_threshold else "larger error of temperatures"
-        lines.append(f"So the held-out recordings contradict the findings ({by}): no name is a claim")
+        if d.holdout.contradict(d.holdout_gain, d.noise_K, d.further_threshold):
+            by = "less probable readings" if d.holdout_gain < -d.further_threshold else "larger error of temperatures"
+            lines.append(f"So the held-out recordings contradict the findings ({by}): no name is a claim")
+        else:
+            lines.append("So the held-out recordings do not confirm the findings: no name is a claim")
     return tuple(lines)
 
 

@@ -101,6 +101,22 @@ def test_held_out_readings_that_are_predicted_worse_take_the_claim_away(
         assert found.has_correction  # what improves the prediction of the rest goes into the model all the same
 
 
+def test_where_model_error_is_large_held_out_readings_have_to_confirm_a_claim(
+    assembled: Assemble, prepared: Prepared, windage: Judged, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of what always acts: what began at a date may be over by then."""
+    monkeypatch.setattr(predictions, "log_score_gain", lambda *_: 0.5)
+    dated = replace(windage, effects=tuple(replace(one, how="from_date") for one in windage.effects))
+    full, none = error_classes()[-1], error_classes()[0]
+    for best, grade in ((replace(windage, error_class=full), "likely"), (replace(windage, error_class=none), "claim"),
+                        (replace(dated, error_class=full), "claim")):  # fmt: skip
+        claim = Answer(best=best, effect=best.effects[0], grade="claim", probability=0.95, joint=0.95)
+        found = assembled(posterior_of(prepared[2], best, remainder=1.5), [claim])
+        assert found.findings[0].grade == grade and found.contradicted is (grade == "likely")
+        confirmed = "held-out recordings do not confirm the findings" not in "\n".join(found.summary())
+        assert confirmed is (grade == "claim")
+
+
 def test_held_out_readings_count_against_what_was_learnt_from(
     assembled: Assemble, prepared: Prepared, windage: Judged, monkeypatch: pytest.MonkeyPatch
 ) -> None:
