@@ -12,8 +12,13 @@ from diagnosis import Diagnosis, diagnose
 from diagnosis.recordings.recording import Recording
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
+from models.mechanisms import CATALOGUE
 from tests.unit.diagnosis.inference_example import recorded
 
+TRIED = (
+    "sensor_stuck", "sensor_bias", "sensor_gain", "sensor_drift", "sensor_lag", "swapped_channels", "clock_offset",
+    "windage", "pump_heat", "foundation_conduction", "oil_loss",
+)  # fmt: skip
 NODES = ("oil", "housing_lower", "housing_upper", "bearing_1", "pinion")
 
 
@@ -28,7 +33,7 @@ def hanging(fzg: Gearbox) -> Diagnosis:
     first, second, held = (recorded(fzg, name, hours=hours, seed=seed, nodes=NODES)
                            for seed, (name, hours) in enumerate((("a", 3.0), ("b", 2.0), ("c", 2.0))))  # fmt: skip
     hangs = with_broken(first, "oil", lambda time, T: np.where(time < 3600.0, T, T[360]))
-    return diagnose([hangs, second], fzg, holdout=[held])
+    return diagnose([hangs, second], fzg, holdout=[held], catalogue={name: CATALOGUE[name] for name in TRIED})
 
 
 def test_a_sensor_that_hangs_in_one_recording_is_held_in_that_one(hanging: Diagnosis) -> None:
