@@ -296,7 +296,7 @@ def _with_random_heat(experiment: Experiment, error: ModelError, fit: Fit) -> Ca
 
 
 def calibrate_in_draughts(calibration: Calibration) -> Calibration | None:
-    """The same machine where draughts change the heat of all parts to the surroundings by one random share.
+    """Calibration in draughts, which change the heat of all parts to the surroundings by one random share.
 
     None if they bring less than :data:`DRAUGHT_WORTH`, or channels were set apart: a broken sensor is no draught.
 

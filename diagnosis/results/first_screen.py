@@ -112,7 +112,7 @@ def _missing(d: Diagnosis) -> str:
         "effect may hide in that."
     ) if off[0] > BADLY * d.settings.matters_K + d.noise_K else ""  # fmt: skip
     refuted = (
-        f" What was learnt from speaks for {d.refuted.names} ({d.refuted.log_e_value:.1f} nat), but with it the "
+        f" What was learnt from supports {d.refuted.names} ({d.refuted.log_e_value:.1f} nat), but with it the "
         f"held-out readings are less probable, by {-d.refuted.log_score_gain:.0f} nat; both count."
     ) if d.refuted else ""  # fmt: skip
     return f"Nothing that these data show{where}: {reached}.{refuted}{doubt}"

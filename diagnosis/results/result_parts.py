@@ -255,7 +255,7 @@ class Errors(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Refuted:
-    """What the recordings learnt from speak for, and the held-out ones against so much that nothing is detected.
+    """Effects that the recordings learnt from support, and the held-out ones contradict so much that none is detected.
 
     Attributes
     ----------

@@ -134,7 +134,7 @@ def test_held_out_readings_count_against_what_was_learnt_from(
     stored = found.to_dict()["significance"]["refuted"]
     assert stored == {"names": "windage at oil", "log_e_value": posterior.log_e, "log_score_gain": -1.0 - spare}
     (missing,) = dict(found.first_screen)["Is something missing?"]
-    assert f"speaks for windage at oil ({posterior.log_e:.1f} nat)" in missing
+    assert f"supports windage at oil ({posterior.log_e:.1f} nat)" in missing
     assert f"less probable, by {spare + 1.0:.0f} nat; both count." in missing
 
 
