@@ -12,7 +12,8 @@ it from top to bottom):
    cannot know is integrated over, in classes between which the recordings choose.
 6. ``candidates``, ``engine.families``: everything that may be missing, wrong or changed, with its prior.
 7. ``engine.scan``, ``gram``: all candidates at once by a straight line; ``refit``: the best of them fitted.
-8. ``decision.infer``: scan, race, refit, second scan; ``posterior``: probabilities; ``answer``: claim, likely, a tie.
+8. ``decision.draughts``: in still air, in draughts, or both; ``infer``: scan, race, refit, second scan; ``posterior``:
+   probabilities; ``answer``: claim, likely, a tie.
 9. ``results.assemble``: predictions, places, findings, advice as a :class:`~diagnosis.results.result.Diagnosis`;
    ``report``: the page and the files.
 
