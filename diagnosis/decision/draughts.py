@@ -11,7 +11,7 @@ from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.families import with_priors
 from diagnosis.engine.scan import scan
 
-FIT_BRINGS = 2.0  # times the evidence of the scan, that a fit brings at most on the open cases
+FIT_BRINGS = 2.0  # times the evidence of the scan, that fits are given credit for; those of a switch may bring more
 
 
 def worth_weighing(both: Sequence[Calibration], candidates: Sequence[Hypothesis]) -> list[Calibration]:
