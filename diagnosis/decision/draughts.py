@@ -19,6 +19,13 @@ def worth_weighing(both: Sequence[Calibration], candidates: Sequence[Hypothesis]
 
     Draughts that the machine without an effect asks for are large enough to pass for one: a fan that fails is a long
     calm. So an effect may be judged in still air too, against the machine in draughts.
+
+    Parameters
+    ----------
+    both : sequence of Calibration
+        Of the same recordings, with different random heats
+    candidates : sequence of Hypothesis
+        All that may be missing, without priors
     """
     evidence = [max(scan_in_classes(one, scan(one.fit, with_priors(candidates), one.near.columns)).log_e, 0.0)
                 for one in both]  # fmt: skip

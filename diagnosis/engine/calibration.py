@@ -10,7 +10,7 @@ import numpy as np
 
 from diagnosis.engine.fit import FIRST_ITERATIONS, ITERATIONS, Experiment, Fit, Linear
 from diagnosis.engine.gram import Gram, gram_of, whitened_base
-from diagnosis.engine.learnt import ErrorClass, error_classes, widest_class
+from diagnosis.engine.learnt import ErrorClass, error_classes, rule, widest_class
 from diagnosis.engine.metric import Metric, leading_directions
 from diagnosis.engine.model_error import ModelError
 from diagnosis.engine.sessions import fit_over_sessions, most_deviation, over_sessions
@@ -21,7 +21,6 @@ from models.base.types import Array
 TURNS = 3  # with the chosen class: point, columns of model error and deviation between sessions settle together
 LONGEST = 16.0  # times as long as assumed, random heats may last where only the form of the laws is known
 WORTH = 1.0  # nats that another random heat has to bring
-DRAUGHT, DRAUGHT_WORTH = 0.05, 5.0  # of all heat to the surroundings, at most; nats that draughts have to bring
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -145,7 +144,7 @@ class NearReadings:
         that brings most evidence as long as one does. They are never more than assumed, and with geometry they do not
         last longer: an effect of hours would pass for random.
         """
-        longest = LONGEST if self.experiment.noise[0].goes_with_capacity else 1.0
+        longest, (most, _) = LONGEST if self.experiment.noise[0].goes_with_capacity else 1.0, rule().draughts
         best = start
         while True:
             tried = [replace(best, **{name: times * getattr(best, name)})
@@ -153,7 +152,7 @@ class NearReadings:
             # Less heat that lasts longer does nearly the same: both change at once, or neither would alone.
             tried += [replace(best, heat=times * best.heat, time=best.time / times) for times in (0.5, 2.0)]
             able = [one for one in tried
-                    if max(one.heat, one.wander, one.draught / DRAUGHT) <= 1.0 <= one.time <= longest]  # fmt: skip
+                    if max(one.heat, one.wander, one.draught / most) <= 1.0 <= one.time <= longest]  # fmt: skip
             other = max(able, key=log_evidence)
             if log_evidence(other) < log_evidence(best) + WORTH:
                 return best
@@ -298,7 +297,8 @@ def _with_random_heat(experiment: Experiment, error: ModelError, fit: Fit) -> Ca
 def calibrate_in_draughts(calibration: Calibration) -> Calibration | None:
     """Calibration in draughts, which change the heat of all parts to the surroundings by one random share.
 
-    None if they bring less than :data:`DRAUGHT_WORTH`, or channels were set apart: a broken sensor is no draught.
+    None if they bring less evidence than :attr:`Rule.draughts` asks for, or channels were set apart: a broken sensor is
+    no draught.
 
     Raises
     ------
@@ -309,8 +309,9 @@ def calibrate_in_draughts(calibration: Calibration) -> Calibration | None:
         return None
     near, fit, widest = calibration.near, calibration.fit, widest_class()
     log_evidence, has = near.evidence_of(widest, fit.z), near.experiment.random_heat
-    times = near.most_probable(log_evidence, replace(has, draught=DRAUGHT))
-    if log_evidence(times) < log_evidence(has) + DRAUGHT_WORTH:
+    most, worth = rule().draughts
+    times = near.most_probable(log_evidence, replace(has, draught=most))
+    if log_evidence(times) < log_evidence(has) + worth:
         return None
     free = replace(near.experiment.with_random_heat(times), most_deviation=np.inf)
     found = _with_random_heat(free, near.error, fit)

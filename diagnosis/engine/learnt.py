@@ -69,6 +69,10 @@ class Rule:
         How often a name was right, or its law at its place, where that much was left, [-]
     named_if_large : float
         Evidence from which a name counts where model error is large, [nat]
+    confirmed : float
+        Log score that held-out readings have to gain there by an effect that always acts, for a claim, [nat]
+    draughts : (float, float)
+        Random share of all heat to the surroundings, at most, [-]; evidence that it has to bring, [nat]
     repeats : float
         Deviation between sessions that every machine is granted, in prior standard deviations
     one_event : (float, float)
@@ -90,6 +94,8 @@ class Rule:
     much_left: tuple[float, float]
     nearest: float
     named_if_large: float
+    confirmed: float
+    draughts: tuple[float, float]
     repeats: float
     one_event: tuple[float, float]
     trusted: tuple[int, float]

@@ -54,7 +54,6 @@ from models.terms.term import Term
 ENOUGH_VISIBLE = 0.1  # of the effects that were asked for, for a "consistent" that means something
 MOST_RANKED = 500
 PROBABLY = 0.5
-CONFIRMED = 1.0  # nat that held-out readings have to bring, where model error is large, for a claim that always acts
 LEFT_OUT = "; a second effect, without a name, was fitted too and is left out: the held-out recordings contradict it"
 
 
@@ -119,7 +118,7 @@ def assemble(
         gain = predicted.holdout_gain
         against = holdout.contradict(gain, setup.noise_K, posterior.class_threshold)
         if best is not None and best.error_class.is_large and all(one.how == "always" for one in best.effects):
-            against |= gain < CONFIRMED
+            against |= gain < posterior.rule.confirmed
         return predicted, holdout, against and bool(answers) and not faulty
 
     best = _best(posterior, answers)

@@ -69,7 +69,7 @@ def verdict_text_of(d: Diagnosis) -> str:
 def first_screen_of(d: Diagnosis) -> tuple[tuple[str, tuple[str, ...]], ...]:
     """Questions with their answers; those without an answer are left out."""
     asked = (
-        ("Is something missing?", (_missing(d),)),
+        ("Is something missing?", (_missing(d), *_taken_back(d))),
         ("Where?", _where(d)),
         ("What?", _what(d)),
         ("How sure?", _how_sure(d)),
@@ -111,11 +111,15 @@ def _missing(d: Diagnosis) -> str:
         f" But calibrated, the model is {off[0]:.2f} K off what was {off[1]}: it fits this machine badly, and an "
         "effect may hide in that."
     ) if off[0] > BADLY * d.settings.matters_K + d.noise_K else ""  # fmt: skip
-    refuted = (
-        f" What was learnt from supports {d.refuted.names} ({d.refuted.log_e_value:.1f} nat), but with it the "
-        f"held-out readings are less probable, by {-d.refuted.log_score_gain:.0f} nat; both count."
-    ) if d.refuted else ""  # fmt: skip
-    return f"Nothing that these data show{where}: {reached}.{refuted}{doubt}"
+    return f"Nothing that these data show{where}: {reached}.{doubt}"
+
+
+def _taken_back(d: Diagnosis) -> tuple[str, ...]:
+    """Effects that held-out readings took back."""
+    if d.refuted is None:
+        return ()
+    less = f"with it the held-out readings are less probable, by {-d.refuted.log_score_gain:.0f} nat; both count."
+    return (f"What was learnt from supports {d.refuted.names} ({d.refuted.log_e_value:.1f} nat), but {less}",)
 
 
 def _cannot_be_fitted(d: Diagnosis) -> bool:

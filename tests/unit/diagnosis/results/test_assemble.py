@@ -133,9 +133,9 @@ def test_held_out_readings_count_against_what_was_learnt_from(
     assert found.holdout.after == found.holdout.calibrated
     stored = found.to_dict()["significance"]["refuted"]
     assert stored == {"names": "windage at oil", "log_e_value": posterior.log_e, "log_score_gain": -1.0 - spare}
-    (missing,) = dict(found.first_screen)["Is something missing?"]
-    assert f"supports windage at oil ({posterior.log_e:.1f} nat)" in missing
-    assert f"less probable, by {spare + 1.0:.0f} nat; both count." in missing
+    _, back = dict(found.first_screen)["Is something missing?"]
+    assert f"supports windage at oil ({posterior.log_e:.1f} nat)" in back
+    assert f"less probable, by {spare + 1.0:.0f} nat; both count." in back
 
 
 def test_held_out_readings_are_judged_in_the_draughts_of_the_machine(
