@@ -21,15 +21,14 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from diagnosis.decision.scanned import scan_in_classes
+from diagnosis.decision.scanned import scan_at, scan_in_classes
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import calibrate_with_error
-from diagnosis.engine.families import candidates_of, with_priors
+from diagnosis.engine.families import candidates_of
 from diagnosis.engine.fit import calibrate
 from diagnosis.engine.learnt import ErrorClass, error_classes
 from diagnosis.engine.model_error.groups import GROUPS
 from diagnosis.engine.prepare import prepare_experiment
-from diagnosis.engine.scan import scan
 from diagnosis.proof.cases.case_files import DEFINITION
 from diagnosis.proof.scoring.truth import CONTROL, Truth, read_truths
 from diagnosis.recordings.read import read_recordings
@@ -83,15 +82,14 @@ def scan_case(folder: Path, gearbox: str) -> dict[str, Any]:
     machine, train, held = read_case(folder, gearbox)
     setup, experiment = prepare_experiment(machine, train, held)
     calibration = calibrate_with_error(experiment, calibrate(experiment))
-    candidates = with_priors(candidates_of(setup, experiment))
-    found = scan(calibration.fit, candidates, calibration.near.columns)
+    found = scan_at(calibration, candidates_of(setup, experiment))
     result: dict[str, Any] = {"case": folder.name}
     for name, classes in variants().items():
         scanned = scan_in_classes(calibration, found, classes)
         nothing = max(float(np.log(one.error_class.prior)) + one.over.log_evidence for one in scanned.classes)
         scanned, threshold = scanned.to_its_best(RATE)
         names: dict[str, float] = {}
-        for candidate, weight in zip(candidates, scanned.weights.tolist(), strict=True):
+        for candidate, weight in zip(scanned.candidates, scanned.weights.tolist(), strict=True):
             names[candidate.mechanism] = max(weight, names.get(candidate.mechanism, -np.inf))
         result[name] = {"nothing": nothing, "log_e": scanned.log_e, "threshold": threshold, "names": names}
     return result

@@ -21,6 +21,7 @@ from pathlib import Path
 
 from benchmarks.diagnose import make_recordings
 from diagnosis.decision.infer import infer
+from diagnosis.decision.scanned import scan_at
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import calibrate_with_error
 from diagnosis.engine.families import candidates_of
@@ -68,7 +69,9 @@ def stages_of(gearbox: str, recordings: Sequence[str]) -> dict[str, float]:
     clock.mark("calibration")
     candidates = candidates_of(setup, experiment)
     clock.mark("candidates placed")
-    infer(calibration, candidates, Settings(), progress=clock.told)
+    found = scan_at(calibration, candidates)
+    clock.mark("scanning")
+    infer(calibration, found, Settings(), progress=clock.told)
     clock.end()
     return clock.stages
 

@@ -11,6 +11,7 @@ import numpy as np
 from diagnosis.decision.answer import decide
 from diagnosis.decision.draughts import most_probable, worth_weighing
 from diagnosis.decision.infer import infer
+from diagnosis.decision.scanned import scan_at
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import calibrate_in_draughts, calibrate_with_error, recalibrate
 from diagnosis.engine.families import candidates_of
@@ -114,27 +115,25 @@ def diagnose(
         progress("calibrating with model error")
         calibration = calibrate_with_error(experiment, others, apart)
         candidates, outside = candidates_of(setup, experiment), outside_of(setup, experiment)
-        weigh = partial(
-            infer, candidates=candidates, settings=settings, progress=progress,
-            candidates_in=partial(candidates_of, setup),
-        )  # fmt: skip
-        both, rival = [calibration], -np.inf
+        weigh = partial(infer, settings=settings, progress=progress, candidates_in=partial(candidates_of, setup))
+        progress(f"scanning {len(candidates)} candidates")
+        both, rival = [(calibration, scan_at(calibration, candidates))], -np.inf
         if (in_draughts := calibrate_in_draughts(calibration)) is not None:
             progress("comparing still air and draughts")
             rival = in_draughts.chosen.log_evidence
-            both = worth_weighing([calibration, in_draughts], candidates)
-        weighed = [(one, weigh(one, outside=outside, rival=rival)) for one in both]
+            both = worth_weighing([*both, (in_draughts, scan_at(in_draughts, candidates))])
+        weighed = [(one, weigh(one, found, outside=outside, rival=rival)) for one, found in both]
         calibration, posterior = most_probable(weighed)
         if posterior.elsewhere is not None:
             progress("calibrating again from a better start that was seen")
             again = recalibrate(calibration, posterior.elsewhere)
             if again.chosen.log_evidence > calibration.chosen.log_evidence:
                 calibration = again
-                posterior = weigh(calibration, outside=outside, rival=rival)
+                posterior = weigh(calibration, scan_at(calibration, candidates), outside=outside, rival=rival)
         faulty, rest = faulty_channels(posterior, apart), None
         if faulty and calibration.of_others is not None:
             progress(f"looking at the machine without {', '.join(apart)}")
-            rest = weigh(calibration.of_others)
+            rest = weigh(calibration.of_others, scan_at(calibration.of_others, candidates))
         progress("predicting the recordings free-running")
         return assemble(
             setup, experiment, posterior, decide(posterior), plain=plain if rest is None else others,

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import add
 
-from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.posterior import Posterior
 from diagnosis.decision.scanned import scan_in_classes
 from diagnosis.engine.calibration import Calibration
-from diagnosis.engine.families import with_priors
-from diagnosis.engine.scan import scan
+from diagnosis.engine.scan import Scan
 
 FIT_BRINGS = 2.0  # times the evidence of the scan, that fits are given credit for; those of a switch may bring more
 
 
-def worth_weighing(both: Sequence[Calibration], candidates: Sequence[Hypothesis]) -> list[Calibration]:
+def worth_weighing(both: Sequence[tuple[Calibration, Scan]]) -> list[tuple[Calibration, Scan]]:
     """Calibrations in which an effect may be more probable than in the others, by the scan of all single ones.
 
     Draughts that the machine without an effect asks for are large enough to pass for one: a fan that fails is a long
@@ -22,16 +21,13 @@ def worth_weighing(both: Sequence[Calibration], candidates: Sequence[Hypothesis]
 
     Parameters
     ----------
-    both : sequence of Calibration
+    both : sequence of (Calibration, Scan)
         Of the same recordings, with different random heats
-    candidates : sequence of Hypothesis
-        All that may be missing, without priors
     """
-    evidence = [max(scan_in_classes(one, scan(one.fit, with_priors(candidates), one.near.columns)).log_e, 0.0)
-                for one in both]  # fmt: skip
-    best = max(one.chosen.log_evidence + more for one, more in zip(both, evidence, strict=True))
-    return [one for one, more in zip(both, evidence, strict=True)
-            if one.chosen.log_evidence + FIT_BRINGS * more >= best]  # fmt: skip
+    nothing = [calibration.chosen.log_evidence for calibration, _ in both]
+    brings = [max(scan_in_classes(*one).log_e, 0.0) for one in both]
+    best = max(map(add, nothing, brings))
+    return [one for one, base, more in zip(both, nothing, brings, strict=True) if base + FIT_BRINGS * more >= best]
 
 
 def most_probable(weighed: Sequence[tuple[Calibration, Posterior]]) -> tuple[Calibration, Posterior]:

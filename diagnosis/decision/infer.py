@@ -36,12 +36,11 @@ from diagnosis.decision.scanned import (
 )
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration
-from diagnosis.engine.families import with_priors
 from diagnosis.engine.fit import NO_SOLUTION, Fit
 from diagnosis.engine.learnt import ErrorClass, rule
 from diagnosis.engine.outside import judge_outside
 from diagnosis.engine.refit import refit
-from diagnosis.engine.scan import scan
+from diagnosis.engine.scan import Scan, scan
 from diagnosis.engine.sessions import fit_over_sessions
 from diagnosis.engine.switch_grid import held_numbers, with_refined_switches
 from models.base.progress import Progress, silent
@@ -60,7 +59,7 @@ WORTH, WORTH_SHARE = 1.0, 0.1  # nats, and share of the best, from which a candi
 
 
 def infer(
-    calibration: Calibration, candidates: Sequence[Hypothesis], settings: Settings, *,
+    calibration: Calibration, found: Scan, settings: Settings, *,
     outside: Sequence[Hypothesis] = (), candidates_in: CandidatesIn = lambda _: (), rival: float = -np.inf,
     progress: Progress = silent,
 ) -> Posterior:  # fmt: skip
@@ -68,6 +67,8 @@ def infer(
 
     Parameters
     ----------
+    found : Scan
+        Of all candidates at the calibrated point, with their priors
     outside : sequence of Hypothesis
         Unknown heats, judged where something is missing
     candidates_in : callable
@@ -80,9 +81,8 @@ def infer(
     base, chosen = calibration.fit, calibration.chosen
     if base.experiment.healthy:
         progress("judging the baselines as if they were tested")
-    placebo, candidates = judge_baselines(calibration, with_priors(candidates), candidates_in)
-    progress(f"scanning {len(candidates)} candidates")
-    found = scan(base, candidates, calibration.near.columns)
+    placebo, candidates = judge_baselines(calibration, found.candidates, candidates_in)
+    found = replace(found, candidates=candidates)
     first = scan_in_classes(calibration, found)
     starts: list[tuple[Scanned, StartOf]] = [(first, lambda one: calibration.in_class(one).fit)]
     if float(np.max(np.abs(base.z), initial=0.0)) > FAR_SD:

@@ -12,6 +12,7 @@ from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.posterior import Expected, Judged, Likeness, Repeating, ScaledError
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration
+from diagnosis.engine.families import with_priors
 from diagnosis.engine.gram import Strengths
 from diagnosis.engine.learnt import ErrorClass, rule
 from diagnosis.engine.scan import Scan, scan
@@ -81,6 +82,11 @@ class Scanned:
     def in_class(self, error_class: ErrorClass) -> ScanInClass:
         """Everything with model error of one class."""
         return next(one for one in self.classes if one.error_class == error_class)
+
+
+def scan_at(calibration: Calibration, candidates: Sequence[Hypothesis]) -> Scan:
+    """All candidates at the calibrated point, with their priors and model error."""
+    return scan(calibration.fit, with_priors(candidates), calibration.near.columns)
 
 
 def scan_in_classes(calibration: Calibration, found: Scan, classes: Sequence[ErrorClass] = ()) -> Scanned:

@@ -18,7 +18,7 @@ def diagnosed(fzg: Gearbox, monkeypatch: pytest.MonkeyPatch, **stages: Any) -> A
         "prepare_experiment": lambda *_, **__: (None, SimpleNamespace(pieces=[SimpleNamespace(recording="made")])),
         "calibrate": lambda *_: None, "calibrate_apart": lambda *_: (None, ()),
         "start_with_switches": lambda *_: None, "candidates_of": lambda *_: (), "outside_of": lambda *_: (),
-        "faulty_channels": lambda *_: (), "decide": lambda *_: (),
+        "scan_at": lambda *_: None, "faulty_channels": lambda *_: (), "decide": lambda *_: (),
         "assemble": lambda setup, experiment, posterior, *_, **given: (posterior.name, given["calibration"].name),
     }  # fmt: skip
     for name, stage in (idle | stages).items():
@@ -73,7 +73,8 @@ def test_effects_are_weighed_in_still_air_and_in_draughts(
 
     result = diagnosed(
         fzg, monkeypatch, infer=infer, calibrate_with_error=lambda *_: both["still"],
-        calibrate_in_draughts=lambda *_: both["draughts"], worth_weighing=lambda *_: [both[name] for name in worth],
+        calibrate_in_draughts=lambda *_: both["draughts"],
+        worth_weighing=lambda scanned: [one for one in scanned if one[0].name in worth],
     )  # fmt: skip
     assert result == (reported, reported)
     assert rivals == [100.0] * len(worth)  # an effect has to exceed the machine in draughts

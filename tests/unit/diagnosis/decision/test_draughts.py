@@ -12,6 +12,7 @@ from diagnosis.candidates.factors import factors_of
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.draughts import most_probable, worth_weighing
 from diagnosis.decision.infer import infer
+from diagnosis.decision.scanned import scan_at
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration, calibrate_in_draughts, calibrate_with_error
 from diagnosis.engine.families import axis_of
@@ -53,9 +54,10 @@ def changed(fzg: Gearbox) -> tuple[Sequence[Hypothesis], Calibration, Calibratio
 def test_draughts_are_no_change_of_the_cooling(fzg: Gearbox) -> None:
     experiment = shaken(fzg, times=0.0, draught=0.05)
     candidates, (still, draughty) = changes_of_cooling(fzg, experiment), both(experiment)
-    assert worth_weighing([still, draughty], candidates) == [draughty]
+    scans = [(one, scan_at(one, candidates)) for one in (still, draughty)]
+    assert worth_weighing(scans) == [scans[1]]
     rival = draughty.chosen.log_evidence
-    weighed = [(one, infer(one, candidates, Settings(), rival=rival)) for one in (still, draughty)]
+    weighed = [(one, infer(one, found, Settings(), rival=rival)) for one, found in scans]
     assert not any(posterior.detected for _, posterior in weighed)
     assert most_probable(weighed)[0] is draughty
 
@@ -65,12 +67,12 @@ def test_a_change_of_the_cooling_is_no_draught(
 ) -> None:
     """Without it draughts are more probable than still air; the change in still air is more probable than both."""
     candidates, still, draughty = changed
+    scans = [(one, scan_at(one, candidates)) for one in (still, draughty)]
     ahead = draughty.chosen.log_evidence - still.chosen.log_evidence
-    assert ahead > 5.0 and worth_weighing([still, draughty], candidates) == [still, draughty]
-    alone = infer(still, candidates, Settings())
-    weighed = [
-        (one, infer(one, candidates, Settings(), rival=draughty.chosen.log_evidence)) for one in (draughty, still)
-    ]
+    assert ahead > 5.0 and worth_weighing(scans) == scans
+    alone = infer(*scans[0], Settings())
+    rival = draughty.chosen.log_evidence
+    weighed = [(one, infer(one, found, Settings(), rival=rival)) for one, found in reversed(scans)]
     calibration, found = most_probable(weighed)
     assert calibration is still and found.detected and found.explanations[0].names == ("air_cooling",)
     assert found.rival_ahead == pytest.approx(ahead, abs=0.5)

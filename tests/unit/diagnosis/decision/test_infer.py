@@ -23,7 +23,15 @@ from diagnosis.decision.infer import (
 )
 from diagnosis.decision.placebo import are_trusted
 from diagnosis.decision.posterior import KINDS, Judged, Posterior
-from diagnosis.decision.scanned import ScanInClass, Scanned, counts_less, hardly_there, in_best_classes, scan_in_classes
+from diagnosis.decision.scanned import (
+    ScanInClass,
+    Scanned,
+    counts_less,
+    hardly_there,
+    in_best_classes,
+    scan_at,
+    scan_in_classes,
+)
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration, calibrate_with_error, recalibrate
 from diagnosis.engine.families import axis_of, changes, parameters_outside
@@ -65,9 +73,9 @@ def inferred(
         return [*(hypothesis_of(one) for one in placed), *changes([], dated, axis_of(there), {}),
                 *parameters_outside(there)]  # fmt: skip
 
-    candidates = candidates_in(experiment)
-    return infer(calibrate_with_error(experiment, calibrate(experiment)), candidates, Settings(),
-                 candidates_in=candidates_in)  # fmt: skip
+    calibration = calibrate_with_error(experiment, calibrate(experiment))
+    found = scan_at(calibration, candidates_in(experiment))
+    return infer(calibration, found, Settings(), candidates_in=candidates_in)
 
 
 @pytest.fixture(scope="module")
@@ -179,7 +187,7 @@ def test_nothing_gets_the_evidence_that_it_has_from_the_point_of_an_explanation(
     worse = replace(settled, chosen=replace(settled.chosen, log_evidence=settled.chosen.log_evidence - 50.0))
     placed = CATALOGUE["windage"].placed(experiment.machine.model.network, setup.scale, setup.channels)
     candidates = [hypothesis_of(one) for one in placed]
-    right, found = (infer(one, candidates, Settings()) for one in (settled, worse))
+    right, found = (infer(one, scan_at(one, candidates), Settings()) for one in (settled, worse))
     assert right.log_e > 10.0 and found.log_e == pytest.approx(right.log_e, abs=3.0)
     assert right.elsewhere is None and found.elsewhere is not None
     again = recalibrate(worse, found.elsewhere).chosen
@@ -308,7 +316,7 @@ def test_fits_begin_at_the_middles_of_the_priors_too_where_the_calibration_went_
 
     monkeypatch.setattr(infer_module, "_refitted", begins)
     monkeypatch.setattr(infer_module, "FAR_SD", far_sd)
-    posterior = infer(calibration, [hypothesis_of(one) for one in placed], Settings())
+    posterior = infer(calibration, scan_at(calibration, [hypothesis_of(one) for one in placed]), Settings())
     assert begun == ([False, True] if far_sd == 0.0 else [False])
     best = max(posterior.judged, key=lambda one: one.weight)
     assert best.fit is not None and best.names == ("windage",)
