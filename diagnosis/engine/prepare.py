@@ -99,31 +99,32 @@ def usual_unknowns(
     Parameters
     ----------
     recordings : sequence of Recording
-        What the mapping of the first one states of a sensor is its prior: lag, its standard deviation and tolerance of
-        the bias
+        What the mapping of the first one states of an instrument is its prior: lag, its standard deviation, tolerances
     interval : float
         Between rows, [s]
     gain_of_torque : Parameter or None
         Prior of the gain of a torque that follows from a power
     """
     stated, slow = {c.name: c for r in reversed(recordings) for c in r.channels}, slow_rows(recordings)
+    of_inputs = {name: sd for r in reversed(recordings) for name, sd in r.tolerances.items()}
     found: list[Unknown] = []
     for p in network.parameters:
         if p.sd > 0.0:
             wider = replace(p, sd=max(p.sd, CAPACITY_SD)) if p.name.startswith("C_") else p
             found.append(NetworkParameter(parameter=wider))
     for name in channels:
+        sensor = stated.get(name)
+        tolerance = sensor.bias_sd if sensor is not None else None
         if is_total_loss(name):
-            gain = Parameter(name="loss_gain", start=1.0, sd=LOSS_GAIN_SD, lower=0.5, upper=2.0, log=False)
-            zero = _normal("bias_P_loss", "W", LOSS_OFFSET_SD_W)
+            gain_sd = LOSS_GAIN_SD if sensor is None or sensor.gain_sd is None else sensor.gain_sd
+            gain = Parameter(name="loss_gain", start=1.0, sd=gain_sd, lower=0.5, upper=2.0, log=False)
+            zero = _normal("bias_P_loss", "W", LOSS_OFFSET_SD_W if tolerance is None else tolerance)
             found += [LossGain(parameter=gain), SensorBias(parameter=zero, channel=TOTAL_LOSS)]
             if not slow:
                 delay = _normal("delay_P_loss", "s", ROWS_LATE * interval)
                 found.append(LossDelay(parameter=delay))
             continue
-        sensor = stated.get(name)
-        tolerance = (sensor.bias_sd if sensor else None) or 0.0
-        bias = _normal(f"bias_{name}", "K", max(tolerance, BIAS_SD_K))
+        bias = _normal(f"bias_{name}", "K", BIAS_SD_K if tolerance is None else tolerance)
         found.append(SensorBias(parameter=bias, channel=name))
         if not slow:
             start = max((sensor.lag_s if sensor else None) or LAG_S, SHORTEST_LAG_S)
@@ -134,12 +135,13 @@ def usual_unknowns(
     if slow:
         found.append(ClockOffset(parameter=_normal("clock_offset", "s", ROWS_LATE * interval)))
     if network.components:
-        torque = Parameter(name="torque_gain", start=1.0, sd=TORQUE_GAIN_SD, lower=0.5, upper=2.0, log=False,
-                           description="true over recorded torque")  # fmt: skip
+        torque = Parameter(name="torque_gain", start=1.0, sd=of_inputs.get("torque", TORQUE_GAIN_SD), lower=0.5,
+                           upper=2.0, log=False, description="true over recorded torque")  # fmt: skip
         found.append(InputGain(parameter=gain_of_torque or torque, input="torque"))
     if "T_ambient" in network.inputs:
         assumed = any("T_ambient" in r.assumed for r in recordings)
-        offset = _normal("ambient_offset", "K", AMBIENT_ASSUMED_SD_K if assumed else AMBIENT_SD_K)
+        usual = AMBIENT_ASSUMED_SD_K if assumed else AMBIENT_SD_K
+        offset = _normal("ambient_offset", "K", of_inputs.get("T_ambient", usual))
         found.append(InputOffset(parameter=offset, input="T_ambient"))
     return found
 

@@ -18,8 +18,12 @@ noise = 0.3                           # white standard deviation of one row, [K]
 resolution = 0.1                      # [K] or [W]
 lag_s = 20
 lag_sd_s = 10
-bias_sd = 1.0                         # tolerance of the sensor, [K] or [W]
+bias_sd = 1.0                         # tolerance of a temperature or of P_loss, [K] or [W]
 valid = [-40, 150]                    # in the unit of the column; values outside are missing
+
+[columns.M1]
+quantity = "torque"
+gain_sd = 0.002                       # relative tolerance of the scale of torque or P_loss
 ```
 
 A gearbox definition may contain one (table ``[recording]``), for recordings that have none next to them.
@@ -43,7 +47,7 @@ from models.definition.messages import validate_section
 from models.definition.sections import Name, NotNegative, Positive, Section, Text
 from models.files import toml_file
 from models.files.table_file import UTF_8, TextForm
-from models.quantities.quantities import SENSOR, Quantity, quantity_of
+from models.quantities.quantities import SENSOR, TOTAL_LOSS, Quantity, quantity_of
 from models.quantities.units import units_in_files
 
 SCHEMA = 1
@@ -53,6 +57,7 @@ SOME_DATE = datetime(2017, 9, 21, 8, 30, 15, tzinfo=UTC)  # a form of dates give
 CLOCK_TIME = "hh:mm:ss"  # unit of times since the start, or of day, as 13:05:00
 TIME_UNITS = ("s", "ms", "us", "ns", "min", "h", "d", "iso8601", CLOCK_TIME)
 AUXILIARY, IGNORE = "auxiliary", "ignore"  # roles of columns that are no quantity
+SCALED = ("torque", TOTAL_LOSS)  # quantities whose scale is calibrated
 KELVIN = (200.0, 600.0)  # no gearbox has such temperatures in degC all the time
 
 
@@ -68,6 +73,7 @@ class Column(Section):
     lag_s: NotNegative | None = None
     lag_sd_s: NotNegative | None = None
     bias_sd: NotNegative | None = None
+    gain_sd: NotNegative | None = None
     valid: tuple[float, float] | None = None
     rows: tuple[str, ...] | None = None
 
@@ -80,6 +86,12 @@ class Column(Section):
     def _sensor_measures_a_node(self) -> Self:
         if self.sensor is not None and not (self.quantity.startswith("T_") and len(self.quantity) > 2):
             raise ValueError(f"sensor = {self.sensor!r} names one of several at a node; quantity must be T_<node>")
+        return self
+
+    @model_validator(mode="after")
+    def _scale_is_calibrated(self) -> Self:
+        if self.gain_sd is not None and self.quantity not in SCALED:
+            raise ValueError(f"gain_sd is the tolerance of the scale of {' or '.join(SCALED)}, not of {self.quantity}")
         return self
 
     @field_validator("scale")

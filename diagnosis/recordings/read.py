@@ -206,12 +206,20 @@ def read_recording(
                 lag_s=role.lag_s,
                 lag_sd_s=role.lag_sd_s,
                 bias_sd=role.bias_sd,
+                gain_sd=role.gain_sd,
                 column=found.names[quantity],
             )
             for quantity in found.measured(network)
             for role in [found.roles[quantity]]
         ),
         segments=segments,
+        tolerances={
+            name: stated
+            for name in found.inputs(network)
+            if name in found.roles
+            for stated in [found.roles[name].bias_sd if name == "T_ambient" else found.roles[name].gain_sd]
+            if stated is not None
+        },
         assumed=tuple(found.assumed),
         notes=tuple(found.notes),
         session=files[0].mapping.session or "",

@@ -42,6 +42,8 @@ class Channel:
         Its uncertainty as stated, [s]
     bias_sd : float or None
         Tolerance of the sensor as stated, [K] or [W]
+    gain_sd : float or None
+        Relative tolerance of its scale as stated
     column : str
         Name in the file
     """
@@ -53,6 +55,7 @@ class Channel:
     lag_s: float | None = None
     lag_sd_s: float | None = None
     bias_sd: float | None = None
+    gain_sd: float | None = None
     column: str = ""
 
 
@@ -85,6 +88,8 @@ class Recording:
     channels : tuple of Channel
     segments : tuple of slice
         Gap-free pieces
+    tolerances : mapping of str to float
+        Of inputs, as stated: T_ambient [K], torque relative to its scale
     assumed : tuple of str
         Inputs that were not recorded; they have the value of the definition
     notes : tuple of str
@@ -108,6 +113,7 @@ class Recording:
     inputs: Mapping[str, Array]
     channels: tuple[Channel, ...]
     segments: tuple[slice, ...]
+    tolerances: Mapping[str, float] = field(default_factory=dict)
     assumed: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     session: str = ""

@@ -6,9 +6,10 @@ from collections import Counter
 from collections.abc import Sequence
 
 from diagnosis.candidates.hypotheses import Hypothesis
+from diagnosis.recordings.recording import Recording
 from diagnosis.results.places import node_in
 from diagnosis.results.result import Verdict
-from diagnosis.results.result_parts import Finding, Location, NotDetectable
+from diagnosis.results.result_parts import Calibrated, Finding, Location, NotDetectable
 from diagnosis.setup.inference_setup import InferenceSetup
 from models.quantities.quantities import is_total_loss, node_of_channel
 
@@ -41,9 +42,23 @@ def separation(setup: InferenceSetup, own: Hypothesis, other: Hypothesis) -> str
     return known[0][0].experiment if known else OTHER_OPERATION
 
 
+def data_sheet(recordings: Sequence[Recording], calibration: Sequence[Calibrated]) -> str:
+    """What to look up of the sensor that seems to be off most; empty if none is, or its tolerance is stated."""
+    unstated = {f"bias_{c.name}": c.column or c.name for r in recordings for c in r.channels if c.bias_sd is None}
+    off = [one for one in calibration if one.is_far and one.parameter in unstated]
+    if not off:
+        return ""
+    worst = max(off, key=lambda one: abs(one.shift_in_sd))
+    usual, way = abs(worst.estimate / worst.shift_in_sd), "little" if worst.estimate < 0.0 else "much"
+    return (
+        f"state the tolerance of {unstated[worst.parameter]} (bias_sd in the mapping; {usual:.2g} {worst.unit} is "
+        f"assumed): it seems to read {abs(worst.estimate):.2f} {worst.unit} too {way}"
+    )
+
+
 def next_test(
     setup: InferenceSetup, verdict: Verdict, findings: Sequence[Finding], location: Sequence[Location],
-    unseen: Sequence[NotDetectable], *, missed: Sequence[str],
+    unseen: Sequence[NotDetectable], *, calibration: Sequence[Calibrated], missed: Sequence[str],
 ) -> str:  # fmt: skip
     """The next measurement; empty if there is nothing to ask for.
 
@@ -51,6 +66,8 @@ def next_test(
     ----------
     location : sequence of Location
         Most probable first
+    calibration : sequence of Calibrated
+        Parameters of the machine and its instruments
     missed : sequence of str
         Held-out recordings that are missed, worst first
     """
@@ -60,10 +77,12 @@ def next_test(
     assumed = {name for recording in (*setup.recordings, *setup.holdout) for name in recording.assumed}
     if verdict == "unexplained" and "T_ambient" in assumed:
         return "record T_ambient_degC: it is taken as constant, so changes of the air look like heat at other parts"
-    for finding in findings:
-        rivals = [rival for rival in finding.confusable_with if rival.instead]
-        if rivals and rivals[0].probability >= WORTH_ASKING:
-            return rivals[0].separate_by
+    if not findings and (sheet := data_sheet(setup.recordings, calibration)):
+        return sheet
+    instead = [[rival for rival in finding.confusable_with if rival.instead] for finding in findings]
+    asked = [rivals[0].separate_by for rivals in instead if rivals and rivals[0].probability >= WORTH_ASKING]
+    if asked:
+        return asked[0]
     free = without_sensor(setup)
     for place in location[1:]:
         if place.probability >= OTHER_PLACE and place.node in free:

@@ -188,7 +188,7 @@ def assemble(
         )),
         next_test=next_test(
             setup, verdict, findings, location if posterior.detected else (), unseen,
-            missed=holdout.far_beyond(train_fits, settings.matters_K),
+            calibration=model.calibration, missed=holdout.far_beyond(train_fits, settings.matters_K),
         ),
         courses=_courses(setup, predicted),
         network=setup.nominal,

@@ -42,7 +42,7 @@ EITHER = "The measurement is at fault, or the model leaves out physics: these da
 MISSED = "What was learnt from agrees with the model; held-out {names} not."
 UNFIT = "The model cannot be brought to fit these recordings, and why has no name."
 SIZES = {0.5: "half as large", 1.0: "as assumed", 2.0: "twice as large"}  # of model error, by factor
-FAR_SD, MOST_FAR = 3.0, 3  # standard deviations of a prior, beyond which the summary tells of a parameter; how many
+MOST_FAR = 3  # parameters far from their priors that the summary tells of
 MOST_UNSEEN = 6  # effects that the summary names of those that cannot be seen
 OF_DATE = ("since", "lasting")  # parameters that the date contains
 BADLY = 2.0  # times the size that matters, which a calibrated model may be off without a word
@@ -209,7 +209,7 @@ def _how_sure(d: Diagnosis) -> tuple[str, ...]:
     if d.log_e_value > d.threshold:
         lines += _against_others(d)
     lines += _sessions_told(d)
-    far = sorted((c for c in d.calibration if abs(c.shift_in_sd) > FAR_SD), key=lambda c: -abs(c.shift_in_sd))
+    far = sorted((c for c in d.calibration if c.is_far), key=lambda c: -abs(c.shift_in_sd))
     if far:
         deviations = {p.name for p in d.network.parameters if p.start == 0.0}  # from what the definition assumes
         told = [f"{c.parameter} {'off by' if c.parameter in deviations else '='} {c.estimate:.3g}{_unit(c.unit)} "

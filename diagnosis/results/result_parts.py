@@ -272,6 +272,7 @@ class Refuted:
     log_score_gain: float
 
 
+FAR_SD = 3.0  # standard deviations of a prior, beyond which a parameter is far from it
 MISSED = 3.0  # times the error of the recordings learnt from, beyond which a held-out one is missed
 
 
@@ -363,6 +364,11 @@ class Calibrated:
     estimate_stderr: float
     shift_in_sd: float
     unit: str = "1"
+
+    @property
+    def is_far(self) -> bool:
+        """True if it is further from its prior than is likely."""
+        return abs(self.shift_in_sd) > FAR_SD
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -23,6 +23,26 @@ def test_air_that_nobody_recorded_is_less_certain(model: NetworkOnGrid, recorded
     assert sd[0] < 1.0 < 3.0 < sd[1]
 
 
+def test_tolerances_that_are_stated_are_the_priors(model: NetworkOnGrid, recorded: Recording) -> None:
+    """A data sheet may know an instrument better than is assumed, or less."""
+    known = {"oil": (0.05, None), "P_loss": (0.5, 0.001)}
+    stated = replace(
+        recorded,
+        tolerances={"T_ambient": 1.5, "torque": 0.002},
+        channels=tuple(
+            replace(c, bias_sd=known.get(c.name, (None, None))[0], gain_sd=known.get(c.name, (None, None))[1])
+            for c in recorded.channels
+        ),
+    )
+    usual, found = (
+        {u.parameter.name: u.parameter.sd for u in usual_unknowns(model.network, [one], CHANNELS, interval=10.0)}
+        for one in (recorded, stated)
+    )
+    changed = {name: sd for name, sd in found.items() if sd != usual[name]}
+    assert changed == {"bias_oil": 0.05, "bias_P_loss": 0.5, "loss_gain": 0.001, "ambient_offset": 1.5,
+                       "torque_gain": 0.002}  # fmt: skip
+
+
 def test_rows_that_are_minutes_apart_are_means(model: NetworkOnGrid, recorded: Recording) -> None:
     """They show neither lags nor which end of the row is stamped; temperatures and inputs may have another one."""
     slow = replace(recorded, time=60.0 * recorded.time)

@@ -221,8 +221,8 @@ def test_a_mapping_names_converts_and_describes(tmp_path: Path, network: Thermal
         constants = { T_ambient = 22.0 }
         [columns]
         n = { quantity = "speed", unit = "rad/s" }
-        M = { quantity = "torque", unit = "kN m", scale = 2.0 }
-        loss = { quantity = "P_loss", unit = "kW" }
+        M = { quantity = "torque", unit = "kN m", scale = 2.0, gain_sd = 0.002 }
+        loss = { quantity = "P_loss", unit = "kW", gain_sd = 0.01, bias_sd = 3.0 }
         [columns.sump]
         quantity = "T_oil"
         unit = "degF"
@@ -240,6 +240,16 @@ def test_a_mapping_names_converts_and_describes(tmp_path: Path, network: Thermal
     np.testing.assert_allclose(oil.values, source["T_oil_degC"])
     assert (oil.noise, oil.resolution, oil.lag_s, oil.lag_sd_s, oil.bias_sd) == (0.2, 0.1, 15.0, 5.0, 0.5)
     np.testing.assert_allclose(channel(recording, "P_loss"), source["P_loss_W"])
+    loss = next(c for c in recording.channels if c.name == "P_loss")
+    assert (loss.gain_sd, loss.bias_sd, recording.tolerances) == (0.01, 3.0, {"torque": 0.002})
+
+
+def test_what_is_stated_of_the_air_is_of_its_offset(tmp_path: Path, network: ThermalNetwork) -> None:
+    source = write(tmp_path / "run.csv", table())
+    stated = 'columns.T_ambient_degC = { quantity = "T_ambient", bias_sd = 0.1 }\n'
+    assert read(source, network, stated).tolerances == {"T_ambient": 0.1}
+    with pytest.raises(InputError, match="gain_sd is the tolerance of the scale of torque or P_loss, not of T_ambient"):
+        read(source, network, stated.replace("bias_sd", "gain_sd"))
 
 
 def test_a_text_of_another_logger(tmp_path: Path, network: ThermalNetwork) -> None:
