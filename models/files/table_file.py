@@ -329,9 +329,9 @@ def _check_head(path: Path, lines: _Lines, form: TextForm) -> tuple[list[str], i
     if not rows:
         raise InputError(f"{path}: {EMPTY}")
     at, _, names = rows[0]
-    if len(names) == 1:
+    above = _header_among([cells for _, _, cells in rows])
+    if above is None:
         _check_separator(path, [line for _, line, _ in rows], form)
-    above = _rows_above_header([cells for _, _, cells in rows])
     if above:
         first, last = at, rows[above - 1][0]
         where = f"lines {first}-{last}" if last > first else f"line {first}"
@@ -360,18 +360,24 @@ def _check_head(path: Path, lines: _Lines, form: TextForm) -> tuple[list[str], i
 
 
 def _check_separator(path: Path, lines: Sequence[str], form: TextForm) -> None:
-    """Refuse lines of which the first has one field, but several with another separator."""
-    for other, word in SEPARATORS.items():
-        if other in lines[0] and other != form.separator:
-            decimal = "," if any(re.search(r"\d,\d", line) for line in lines) else "."
-            raise InputError(f"{path}: its columns are separated by {word}; {_advice(other, decimal, form)}")
+    """Refuse lines that have a header with another separator, or a first line of one field that has several then."""
+    others = [other for other in SEPARATORS if other != form.separator]
+    likely = [other for other in others if _header_among([_fields(line, other) for line in lines]) is not None]
+    if len(_fields(lines[0], form.separator)) == 1:
+        likely += [other for other in others if other in lines[0]]
+    if likely:
+        decimal = "," if any(re.search(r"\d,\d", line) for line in lines) else "."
+        advice = _advice(likely[0], decimal, form)
+        raise InputError(f"{path}: its columns are separated by {SEPARATORS[likely[0]]}; {advice}")
+    if len(_fields(lines[0], form.separator)) > 1:
+        return
     words = {len(line.split()) for line in lines}
     if len(lines) > 1 and len(words) == 1 and words.pop() > 1:
         raise InputError(f"{path}: its columns are separated by spaces; write it with ',' between columns")
 
 
-def _rows_above_header(rows: Sequence[Sequence[str]]) -> int:
-    """Return the number of rows above the first that heads as many columns as the table has; 0 if there is none."""
+def _header_among(rows: Sequence[Sequence[str]]) -> int | None:
+    """Return the place of the first row that heads as many columns as the table has; None if there is none."""
     table = rows[len(rows) // 2 :]
     fewest, most = max(len(_filled(cells)) for cells in table), max(map(len, table))
     for number, cells in enumerate(rows[:-1]):
@@ -384,7 +390,7 @@ def _rows_above_header(rows: Sequence[Sequence[str]]) -> int:
             and not _are_units(names)
         ):
             return number
-    return 0
+    return None
 
 
 def _are_units(cells: Sequence[str]) -> bool:

@@ -230,6 +230,18 @@ def test_noise_of_a_channel_with_gaps_is_that_of_its_values() -> None:
     assert white_sd(sparse) == pytest.approx(0.3, rel=0.1)
 
 
+@pytest.mark.parametrize("noise", [0.05, 0.07, 0.08, 0.1, 0.15, 0.2])
+def test_noise_of_a_display_is_that_of_its_values(noise: float) -> None:
+    """Its differences are whole steps, so their median is one step for noise of 0.05 and of 0.1 alike."""
+    values = np.linspace(20.0, 60.0, 4000) + np.random.default_rng(0).normal(0.0, noise, 4000)
+    shown = np.round(10.0 * values) / 10.0
+    assert white_sd(shown) == pytest.approx(np.hypot(noise, 0.1 / np.sqrt(12.0)), rel=0.05)
+
+
+def test_a_display_that_hardly_moves_has_no_noise() -> None:
+    assert white_sd(np.round(np.linspace(20.0, 30.0, 4000), 1)) == 0.0 == white_sd(np.full(100, 20.0))
+
+
 @pytest.mark.parametrize("unit_s", [60.0, 3600.0, 86400.0])
 def test_times_that_are_rounded_in_another_unit_end_with_the_last_row(unit_s: float) -> None:
     for rows in range(101, 401, 7):

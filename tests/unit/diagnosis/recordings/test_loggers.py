@@ -246,3 +246,14 @@ def test_advice_on_other_endings(tmp_path: Path, network: ThermalNetwork, name: 
     (tmp_path / name).write_text(plain())
     with pytest.raises(InputError, match=f"unknown file ending; use one of .*; {advice}"):
         read_recordings(tmp_path / name, network)
+
+
+@pytest.mark.parametrize("title", ["Rig 3, logger MX4, export", "Rig 3"])
+def test_a_title_above_a_german_table(tmp_path: Path, network: ThermalNetwork, title: str) -> None:
+    """First the separator is told, whatever is in the title, then the title; what is stated rightly is not doubted."""
+    text = f"{title}\n" + table().to_csv(index=False, sep=";", decimal=",")
+    with pytest.raises(InputError, match=r"separated by ';'; give csv = \{ separator = \";\", decimal = \",\" \}"):
+        read(tmp_path, network, text)
+    with pytest.raises(InputError, match=r"line 1 above the header .* skip_lines = \[1\]"):
+        read(tmp_path, network, text, GERMAN)
+    check(read(tmp_path, network, text, GERMAN.replace("}", ", skip_lines = [1] }")))
