@@ -173,7 +173,8 @@ def _what(d: Diagnosis) -> tuple[str, ...]:
             lines += [f"  {line}" for line in (says, values_told(finding), date_told(finding)) if line]
     if d.nearest:
         told = ", ".join(f"{named(one.mechanism, one.place)} ({one.probability:.2f})" for one in d.nearest)
-        lines.append(f"No name is certain enough to be reported; most like: {told}.")
+        also = " Several may be off, or the definition lacks a part or a path." if d.verdict == "parameter_error" else ""
+        lines.append(f"No name is certain enough to be reported; most like: {told}.{also}")
     elif not d.findings and d.verdict not in NO_CLAIM and not _cannot_be_fitted(d):
         lines.append(f"No name of the catalogue stands out: none has a probability of {NEAREST:g}.")
     return tuple(lines)

@@ -312,7 +312,8 @@ class Diagnosis:
         found = [replace(first, probability=min(first.probability + sum(one.probability for one in others), 1.0))
                  for first, *others in of_names.values()]  # fmt: skip
         found.sort(key=lambda one: -one.probability)
-        return tuple(one for one in found[:MOST_NEAREST] if one.probability >= NEAREST)
+        least = 0.0 if self.verdict == "parameter_error" else NEAREST  # one of them it is
+        return tuple(one for one in found[:MOST_NEAREST] if one.probability >= least)
 
     @property
     def first_screen(self) -> tuple[tuple[str, tuple[str, ...]], ...]:

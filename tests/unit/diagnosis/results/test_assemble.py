@@ -361,6 +361,8 @@ def test_a_parameter(assembled: Assemble, prepared: Prepared) -> None:
     row = next(c for c in found.calibration if c.parameter == name)
     assert row.shift_in_sd == pytest.approx(-5.0) and abs(old.z_of(row.value)) < 1.0  # found; in what predicts
     assert f"parameter {name}" in str(found)
+    unsure = str(assembled(raised, []))
+    assert "most like: parameter h_air" in unsure and "the definition lacks a part or a path" in unsure
     claim = read_answer(found.to_dict(), setup.gearbox).claims[0]
     assert claim.sign == -1 and "air" in claim.nodes
 
