@@ -137,6 +137,14 @@ def assemble(
         answers, much, left_out = decide(posterior), False, ""
         best = _best(posterior, answers)
         predicted, holdout, contradicted = judged_by(best)
+    gain, in_model, train_fits = predicted.holdout_gain, best, _fits(setup, predicted.train, counting)
+    if contradicted and holdout.after > holdout.calibrated:  # what does not improve the prediction is not in the model
+        in_model, with_it = None, (train_fits, holdout)
+        predicted, holdout, _ = judged_by(None)
+        train_fits, holdout = (
+            replace(fits, found=known.found)
+            for fits, known in zip((_fits(setup, predicted.train, counting), holdout), with_it, strict=True)
+        )
     final = predicted.final
     if contradicted or much:
         answers = [withdraw_claim(answer, posterior.rule) for answer in answers]
@@ -146,16 +154,15 @@ def assemble(
     ])  # fmt: skip
     findings = tuple(finding for _, finding in reported)
     unseen = _unseen(setup, posterior, findings)
-    train_fits = _fits(setup, predicted.train, counting)
     spoiled = spoiled_in(train_fits, holdout, baselines=[r.name for r in setup.baseline],
                          least_K=settings.matters_K + setup.noise_K)  # fmt: skip
     unfit = bool(spoiled) or train_fits.calibrated - train_fits.before > setup.noise_K
     verdict = verdict_of(posterior, [answer for answer, _ in reported], unseen, unfit=unfit)
     location = locations_of(setup, posterior) if posterior.detected or verdict in NO_CLAIM else ()
     inputs = setup.gearbox.network().inputs
-    most_probable = best if others is None else others.posterior.nothing
+    most_probable = in_model if others is None else others.posterior.nothing
     believed = (most_probable.fit if most_probable else None) or calibration.fit
-    model = _calibrated(final, believed, plain, inputs, best.effects if best else ())
+    model = _calibrated(final, believed, plain, inputs, in_model.effects if in_model else ())
     return Diagnosis(
         verdict=verdict,
         gearbox=setup.gearbox.name,
@@ -168,7 +175,7 @@ def assemble(
         train=train_fits,
         holdout=holdout,
         faulty=faulty,
-        terms=_terms(best, final),
+        terms=_terms(in_model, final),
         known=known,
         sensors=model.sensors,
         true_inputs=model.true_inputs,
@@ -205,7 +212,7 @@ def assemble(
         session_s=posterior.session_s,
         repeating=posterior.repeating,
         placebo=posterior.placebo,
-        holdout_gain=predicted.holdout_gain,
+        holdout_gain=gain,
         contradicted=contradicted,
         draughts_ahead=posterior.rival_ahead,
         refuted=refuted,

@@ -89,6 +89,9 @@ def _missing(d: Diagnosis) -> str:
     reached = f"evidence {d.log_e_value:.1f} nat, {d.threshold:.1f} needed ({why})"
     if d.verdict == "parameter_error":
         return f"No physics, but a parameter is outside its prior: {reached}."
+    if d.log_e_value > d.threshold and d.holdout_gain <= -1.0:
+        both = d.log_e_value + d.holdout_gain
+        return f"Yes{_in_what(d)}: {reached}; {both:.1f} nat remain of what the held-out readings take off."
     if d.log_e_value > d.threshold:
         return f"Yes{_in_what(d)}: {reached}."
     if _cannot_be_fitted(d) and d.train.calibrated <= d.train.before:
@@ -173,8 +176,9 @@ def _what(d: Diagnosis) -> tuple[str, ...]:
             lines += [f"  {line}" for line in (says, values_told(finding), date_told(finding)) if line]
     if d.nearest:
         told = ", ".join(f"{named(one.mechanism, one.place)} ({one.probability:.2f})" for one in d.nearest)
-        also = " Several may be off, or the definition lacks a part or a path." if d.verdict == "parameter_error" else ""
-        lines.append(f"No name is certain enough to be reported; most like: {told}.{also}")
+        lines.append(f"No name is certain enough to be reported; most like: {told}.")
+        if d.verdict == "parameter_error":
+            lines.append("Several may be off, or the definition lacks a part or a path.")
     elif not d.findings and d.verdict not in NO_CLAIM and not _cannot_be_fitted(d):
         lines.append(f"No name of the catalogue stands out: none has a probability of {NEAREST:g}.")
     return tuple(lines)
@@ -281,7 +285,8 @@ def _how_much_better(d: Diagnosis) -> tuple[str, ...]:
     if d.contradicted:
         if d.holdout.contradict(d.holdout_gain, d.noise_K, d.further_threshold):
             by = "less probable readings" if d.holdout_gain < -d.further_threshold else "larger error of temperatures"
-            lines.append(f"So the held-out recordings contradict the findings ({by}): no name is a claim")
+            but = "" if d.terms else ", and the correction is the calibrated model"
+            lines.append(f"So the held-out recordings contradict the findings ({by}): no name is a claim{but}")
         else:
             lines.append("So the held-out recordings do not confirm the findings: no name is a claim")
     return tuple(lines)

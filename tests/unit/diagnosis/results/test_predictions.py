@@ -100,12 +100,13 @@ def test_an_effect_without_a_name_is_left_out_where_held_out_readings_contradict
     z[0] = experiment.unknowns[len(single.fitted.z)].z_of(300.0)
     fit = experiment.fit(np.concatenate([single.fitted.z, z]), iterations=0)
     pair = Judged(effects=(*single.effects, harmful), log_bayes=120.0, fit=fit, error_class=single.error_class)
-    monkeypatch.setattr(assemble, "_final", lambda best, *_: best.fit)
+    monkeypatch.setattr(assemble, "_final", lambda best, plain, _: best.fit if best else plain)
     answers = [Answer(best=pair, effect=effect, grade="claim", probability=0.95, joint=0.95) for effect in pair.effects]
     certain = posterior_of(prepared[2], single, pair, log_e=1e6)  # whatever the held-out readings take off
     found = assembled(certain, answers[:named])
     assert found.contradicted is not stays
-    assert [term.label for term in found.terms] == [one.term.label for one in pair.effects[: 2 - stays] if one.term]
+    assert [term.label for term in found.terms] == [one.term.label for one in pair.effects[:stays] if one.term]
+    assert stays or found.holdout.found > found.holdout.calibrated  # what it would have been with them
     assert found.findings[0].grade == ("claim" if stays and left == 1.0 else "likely")
     assert (found.holdout.after < found.holdout.calibrated) is stays
     assert ("without a name, was fitted too and is left out" in str(found)) is stays
