@@ -25,7 +25,7 @@ from diagnosis.results.advice import next_test
 from diagnosis.results.findings import estimates_of, finding_of, joint_estimate_of, switch_errors
 from diagnosis.results.instruments import sensors_and_inputs_of
 from diagnosis.results.locations import locations_of
-from diagnosis.results.notes import baseline_notes, ratio_notes
+from diagnosis.results.notes import baseline_notes, limit_notes, ratio_notes
 from diagnosis.results.predicted_run import PredictedRun
 from diagnosis.results.predictions import Predicted, Predictions, predict_recordings, temperatures
 from diagnosis.results.result import Diagnosis, Verdict
@@ -203,7 +203,10 @@ def assemble(
         learnt=predicted.learnt,
         left_out_K=predicted.left_out_K,
         inputs=_provenance(setup),
-        notes=(*ratio_notes(final), *baseline_notes(experiment, posterior, answers), *_notes_of_recordings(setup)),
+        notes=(
+            *ratio_notes(final), *limit_notes(final), *baseline_notes(experiment, posterior, answers),
+            *_notes_of_recordings(setup),
+        ),
         kinds={kind: posterior.of(kind) for kind in KINDS},
         settings=settings,
         error_class=posterior.error_class,

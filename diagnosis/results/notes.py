@@ -1,4 +1,4 @@
-"""Notes: baselines with the effect or of another machine, and recordings that identify ratios only."""
+"""Notes: baselines with the effect or of another machine, unknowns at limits, recordings that identify ratios only."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from diagnosis.engine.scan import scan
 from diagnosis.engine.sessions import sessions_apart
 
 NOTED_FROM = 5.0  # nats
+AT_LIMIT = 1e-6  # of a value, from a limit
 LITTLE = 0.01  # of what the recordings know about the sizes one by one: a small part of fixed capacity pretends so much
 
 
@@ -98,6 +99,19 @@ def baselines_told(
             "(for as many hours as are tested) do not count. If it may have changed there, leave the session out."
         )
     return tuple(notes)
+
+
+def limit_notes(fit: Fit) -> tuple[str, ...]:
+    """One sentence if the model that predicts has unknowns at their limits, where they stand in for something else."""
+    at = []
+    for unknown, z in zip(fit.experiment.unknowns, fit.z.tolist(), strict=True):
+        p, value = unknown.parameter, unknown.value(z)
+        if min(value - p.lower, p.upper - value) <= AT_LIMIT * abs(value):
+            at.append(f"{p.name} = {value:.4g}{'' if p.unit == '1' else f' {p.unit}'}")
+    if not at:
+        return ()
+    verb = "is at its limit and stands" if len(at) == 1 else "are at their limits and stand"
+    return (f"in the corrected model {', '.join(at)} {verb} in for something that it lacks: no estimate",)
 
 
 def ratio_notes(fit: Fit) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""Notes on baselines."""
+"""Notes on baselines, and on unknowns at their limits."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import numpy as np
 
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.posterior import Placebo
-from diagnosis.results.notes import baselines_told
+from diagnosis.results.notes import baselines_told, limit_notes
+from tests.unit.diagnosis.results.assembled_example import Prepared
 
 
 def test_an_effect_that_acts_in_the_baselines_is_noted() -> None:
@@ -37,3 +38,17 @@ def test_what_a_baseline_takes_from_a_change_is_noted() -> None:
     assert note.startswith("A baseline, in which nothing changed, seems to show air_cooling_step as well: 95 nat of it")
     assert baselines_told(0.0, {}, ahead=replace(step, less=4.0)) == ()
     assert baselines_told(0.0, {}, ahead=step, counts_from=100.0) == ()  # as much comes by chance
+
+
+def test_unknowns_at_their_limits_are_no_estimates(prepared: Prepared) -> None:
+    plain = prepared[2]
+    unknowns = plain.experiment.unknowns
+    assert limit_notes(plain) == ()
+    low, high = (next(i for i, u in enumerate(unknowns) if u.parameter.name == name) for name in ("bias_oil", "h_air"))
+    z = plain.z.copy()
+    z[low] = unknowns[low].z_of(unknowns[low].parameter.lower)
+    (one,) = limit_notes(replace(plain, z=z))
+    assert one.startswith("in the corrected model bias_oil = ") and "K is at its limit and stands in" in one
+    z[high] = unknowns[high].z_of(unknowns[high].parameter.upper)
+    (both,) = limit_notes(replace(plain, z=z))
+    assert "are at their limits" in both and "h_air = " in both
