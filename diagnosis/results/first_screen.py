@@ -207,7 +207,7 @@ def _how_sure(d: Diagnosis) -> tuple[str, ...]:
         known = ", ".join(d.known.summary()["findings"]) or "calibrated values"
         lines.append(f"Known before, and part of the model as delivered: {known}.")
     if d.error_class:
-        what = "part of what was found" if d.findings else "a real effect"
+        what = "part of a finding" if d.findings else "a real effect"
         hides = f", the largest, because the model fits badly: {what} can hide in it"
         lines.append(
             f"Model error assumed: class {d.error_class}{hides if d.error_class == widest_class().name else ''}."

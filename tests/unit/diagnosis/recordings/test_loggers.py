@@ -257,3 +257,11 @@ def test_a_title_above_a_german_table(tmp_path: Path, network: ThermalNetwork, t
     with pytest.raises(InputError, match=r"line 1 above the header .* skip_lines = \[1\]"):
         read(tmp_path, network, text, GERMAN)
     check(read(tmp_path, network, text, GERMAN.replace("}", ", skip_lines = [1] }")))
+
+
+def test_the_tolerance_of_the_air_is_of_its_offset(tmp_path: Path, network: ThermalNetwork) -> None:
+    text = plain(table().assign(T_ambient_degC=20.0))
+    stated = 'columns.T_ambient_degC = { quantity = "T_ambient", bias_sd = 0.1 }\n'
+    assert read(tmp_path, network, text, stated).tolerances == {"T_ambient": 0.1}
+    with pytest.raises(InputError, match="gain_sd is the tolerance of the scale of torque or P_loss, not of T_ambient"):
+        read(tmp_path, network, text, stated.replace("bias_sd", "gain_sd"))

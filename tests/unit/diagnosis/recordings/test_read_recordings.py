@@ -244,14 +244,6 @@ def test_a_mapping_names_converts_and_describes(tmp_path: Path, network: Thermal
     assert (loss.gain_sd, loss.bias_sd, recording.tolerances) == (0.01, 3.0, {"torque": 0.002})
 
 
-def test_what_is_stated_of_the_air_is_of_its_offset(tmp_path: Path, network: ThermalNetwork) -> None:
-    source = write(tmp_path / "run.csv", table())
-    stated = 'columns.T_ambient_degC = { quantity = "T_ambient", bias_sd = 0.1 }\n'
-    assert read(source, network, stated).tolerances == {"T_ambient": 0.1}
-    with pytest.raises(InputError, match="gain_sd is the tolerance of the scale of torque or P_loss, not of T_ambient"):
-        read(source, network, stated.replace("bias_sd", "gain_sd"))
-
-
 def test_a_text_of_another_logger(tmp_path: Path, network: ThermalNetwork) -> None:
     """Semicolons, decimal commas, texts for missing values, another encoding, a remark, a line of units."""
     source = table().rename(columns={"T_oil_degC": "Öl"})
