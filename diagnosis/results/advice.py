@@ -43,7 +43,7 @@ def separation(setup: InferenceSetup, own: Hypothesis, other: Hypothesis) -> str
 
 
 def data_sheet(recordings: Sequence[Recording], calibration: Sequence[Calibrated]) -> str:
-    """The tolerance to look up, of the sensor that seems to be off most; empty if none is, or its tolerance is stated."""
+    """The tolerance to look up, of the sensor that seems to be off most; empty if none is, or it is stated."""
     unstated = {f"bias_{c.name}": c.column or c.name for r in recordings for c in r.channels if c.bias_sd is None}
     off = [one for one in calibration if one.is_far and one.parameter in unstated]
     if not off:

@@ -236,11 +236,10 @@ def test_a_mapping_names_converts_and_describes(tmp_path: Path, network: Thermal
     np.testing.assert_allclose(recording.inputs["speed"], source["speed_rpm"])
     np.testing.assert_allclose(recording.inputs["torque"], 80.0)
     assert set(recording.inputs["T_ambient"]) == {22.0}
-    oil = next(c for c in recording.channels if c.name == "oil")
+    oil, loss = ({c.name: c for c in recording.channels}[name] for name in ("oil", "P_loss"))
     np.testing.assert_allclose(oil.values, source["T_oil_degC"])
     assert (oil.noise, oil.resolution, oil.lag_s, oil.lag_sd_s, oil.bias_sd) == (0.2, 0.1, 15.0, 5.0, 0.5)
     np.testing.assert_allclose(channel(recording, "P_loss"), source["P_loss_W"])
-    loss = next(c for c in recording.channels if c.name == "P_loss")
     assert (loss.gain_sd, loss.bias_sd, recording.tolerances) == (0.01, 3.0, {"torque": 0.002})
 
 
