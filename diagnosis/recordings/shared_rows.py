@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pandas.util import hash_array
 
 from diagnosis.recordings.recording import Recording
+from diagnosis.recordings.time_axis import moment_text
 from models.base.errors import InputError
 
 SHARED_ROWS, SHARED_SHARE = 20, 0.2  # distinct rows that two recordings have in common
@@ -50,7 +51,12 @@ def _shared(one: Recording, other: Recording, mine: NDArray[np.uint64], theirs: 
     """Describe the overlap of two recordings, as the start of a sentence that ends with a file; empty without one."""
     if one.sha256 == other.sha256:
         first, last = max(one.from_s, other.from_s), min(one.to_s, other.to_s)
-        return f"has the rows of {first:g} ... {last:g} s in common with" if last >= first else ""
+        if last < first:
+            return ""
+        unit = "" if one.clock is not None and one.clock.is_date else " s"
+        return (
+            f"has the rows of {moment_text(first, one.clock)} ... {moment_text(last, one.clock)}{unit} in common with"
+        )
     common = len(np.intersect1d(mine, theirs, assume_unique=True))
     least = min(len(mine), len(theirs))
     if common >= SHARED_ROWS and common > SHARED_SHARE * least:

@@ -69,7 +69,8 @@ kelvin are meant, give 20
     coldest = min(temperatures.values(), default=0.0)
     # Python may continue any state; one number for all nodes, or a file, that hot is in kelvin.
     if not faults and coldest > HOTTEST_START and (source or not isinstance(initial, Mapping)):
-        kelvin = f"; if kelvin are meant, give {coldest + ABSOLUTE_ZERO:g}" if coldest < 1000.0 else ""
+        meant = coldest + ABSOLUTE_ZERO
+        kelvin = f"; if kelvin are meant, give {meant:g}" if meant <= HOTTEST_START else ""
         faults.append(f"the start temperature is {coldest:g}; up to {HOTTEST_START:g} degC is possible{kelvin}")
     if faults:
         raise InputError("\n".join(f"{source}: {fault}" if source else fault for fault in faults))

@@ -12,6 +12,7 @@ import pytest
 
 from diagnosis.recordings.read import read_recordings
 from diagnosis.recordings.recording import Recording
+from diagnosis.recordings.shared_rows import check_shared_rows
 from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError
 from models.simulation.thermal_network import ThermalNetwork
@@ -265,3 +266,12 @@ def test_the_tolerance_of_the_air_is_of_its_offset(tmp_path: Path, network: Ther
     assert read(tmp_path, network, text, stated).tolerances == {"T_ambient": 0.1}
     with pytest.raises(InputError, match="gain_sd is the tolerance of the scale of torque or P_loss, not of T_ambient"):
         read(tmp_path, network, text, stated.replace("bias_sd", "gain_sd"))
+
+
+def test_rows_that_are_shared_are_told_by_their_dates(tmp_path: Path, network: ThermalNetwork) -> None:
+    dates = pd.Timestamp("2024-02-01") + pd.to_timedelta(table()["time_s"], unit="s")
+    path = tmp_path / "run.csv"
+    table().assign(time_s=dates).rename(columns={"time_s": "time"}).to_csv(path, index=False)
+    whole, late = read_recordings([path, f"{path}@2024-02-01T00:05:00.."], network)
+    with pytest.raises(InputError, match=r"rows of 2024-02-01T00:05:00Z \.\.\. 2024-02-01T00:19:50Z in common with"):
+        check_shared_rows([whole], [late])

@@ -111,6 +111,7 @@ def test_torque_loss_and_efficiency() -> None:
         ({"initial": np.nan}, "a finite number above -273.15 degC"),
         ({"initial": -300.0}, "a finite number above -273.15 degC"),
         ({"initial": 293.15}, "is 293.15; up to 250 degC is possible; if kelvin are meant, give 20$"),
+        ({"initial": 999.0}, "is 999; up to 250 degC is possible$"),
         ({"initial": "recorded"}, "the start temperature is 'recorded'; give a number in degC, or one per node"),
         ({"initial": 5000.0}, "is 5000; up to 250 degC is possible$"),
         ({"initial": {part.name: np.inf for part in NETWORK.parts}}, "a finite number above -273.15 degC"),
