@@ -235,7 +235,7 @@ def build(
     1   600.0           24.0
     """
     gearbox, folder = gearbox if isinstance(gearbox, Gearbox) else load_gearbox(gearbox), Path(folder)
-    name = name or Path(gearbox.file).stem
+    name = name or gearbox.short_name
     kinds, built_for, notes = _planned(target, platforms, fmi)
     network = corrected_network(gearbox, correction)
     for boundary in dict.fromkeys(couple):

@@ -86,6 +86,11 @@ class Gearbox:
         return self.definition.name
 
     @property
+    def short_name(self) -> str:
+        """Name of its file, without folder and ending."""
+        return Path(self.file).stem
+
+    @property
     def is_parametric(self) -> bool:
         """True if it has no geometry, and its losses are parametric laws."""
         return isinstance(self.definition, ParametricDefinition)
@@ -460,7 +465,7 @@ def load_gearbox(name_or_path: str | Path) -> Gearbox:
     """
     path = Path(name_or_path)
     if names_a_file(name_or_path):
-        return read_gearbox(read_text(path), file=path.name)
+        return read_gearbox(read_text(path), file=str(path))
     name = str(name_or_path)
     if name not in known_gearboxes():
         hint = did_you_mean(name, known_gearboxes())

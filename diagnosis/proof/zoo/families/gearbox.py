@@ -35,7 +35,7 @@ class _Gearbox:
 
     def __init__(self, family: str, gearbox: Gearbox, design: Design, rng: np.random.Generator) -> None:
         self.sizes, self.design = Sizes(gearbox), design
-        name = gearbox.file.removesuffix(".toml")
+        name = gearbox.short_name
         inputs = ("speed", "torque", "T_ambient", "air_speed")
         self.b = Builder(family, name, inputs, frozenset(self.sizes.nominal_links()), rng)
         self.gearbox, self.oil = gearbox, gearbox.lubricant()

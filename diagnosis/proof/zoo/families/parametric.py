@@ -123,7 +123,7 @@ class _Machine:
                 f"{gearbox.file}: [torque] follows from a power; the zoo needs a recorded torque: name another machine"
             )
         links = frozenset(f"{a}-{c}" for a, c in (link.between for link in self.definition.link))
-        name = gearbox.file.removesuffix(".toml")
+        name = gearbox.short_name
         self.b = Builder(family, name, tuple(self.definition.inputs), links, rng)
         self.capacity = {part.name: part.heat_capacity_J_K for part in self.definition.part}
         self.input_of = {boundary.name: boundary.input for boundary in self.definition.boundary}
