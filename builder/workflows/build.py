@@ -31,7 +31,8 @@ from models.base.types import Array
 from models.base.version import project_version
 from models.correction.correction import Correction, corrected_network
 from models.files.output_files import write_table
-from models.quantities.quantities import node_columns
+from models.quantities.quantities import MEMORY, node_columns
+from models.simulation.thermal_network import ThermalNetwork
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -235,7 +236,7 @@ def build(
     1   600.0           24.0
     """
     gearbox, folder = gearbox if isinstance(gearbox, Gearbox) else load_gearbox(gearbox), Path(folder)
-    name = name or gearbox.short_name
+    name = name or Path(gearbox.file).stem
     kinds, built_for, notes = _planned(target, platforms, fmi)
     network = corrected_network(gearbox, correction)
     for boundary in dict.fromkeys(couple):
@@ -269,6 +270,7 @@ def build(
         with _measure_time(step, seconds):
             told = partial(progress, step)
             full = network.simulate(cycle, losses=losses, initial=COLD_START, progress=told).columns()
+        notes += _at_rest(network, full)
         cycles = {}
         for kind, path in fmus.items():
             if not runs_here(path):
@@ -292,6 +294,14 @@ def build(
         made = sorted(path.relative_to(stage) for path in stage.rglob("*") if path.is_file())
     files = tuple(folder / path for path in made)
     return replace(report, files=files, notes=(*report.notes, *_left_from_before(folder, files)))
+
+
+def _at_rest(network: ThermalNetwork, full: Mapping[str, Array]) -> list[str]:
+    """A note if controls keep their position in the reference cycle, so that it does not test them."""
+    columns = [f"{MEMORY}{state.name}" for state in network.states if state.update is not None]
+    still = ", ".join(name for name in columns if np.ptp(full[name]) == 0.0)
+    advice = "it is not compared: drive the FMU over a recording in which it does (`simulate`)"
+    return [f"in the reference cycle {still} does not switch, so {advice}"] if still else []
 
 
 def _planned(target: str, platforms: str, fmi: str) -> tuple[tuple[str, ...], tuple[str, ...], list[str]]:

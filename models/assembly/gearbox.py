@@ -86,11 +86,6 @@ class Gearbox:
         return self.definition.name
 
     @property
-    def short_name(self) -> str:
-        """Name of its file, without folder and ending."""
-        return Path(self.file).stem
-
-    @property
     def is_parametric(self) -> bool:
         """True if it has no geometry, and its losses are parametric laws."""
         return isinstance(self.definition, ParametricDefinition)

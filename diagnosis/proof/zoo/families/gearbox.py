@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import pairwise
+from pathlib import PurePath
 
 import numpy as np
 
@@ -35,7 +36,7 @@ class _Gearbox:
 
     def __init__(self, family: str, gearbox: Gearbox, design: Design, rng: np.random.Generator) -> None:
         self.sizes, self.design = Sizes(gearbox), design
-        name = gearbox.short_name
+        name = PurePath(gearbox.file).stem
         inputs = ("speed", "torque", "T_ambient", "air_speed")
         self.b = Builder(family, name, inputs, frozenset(self.sizes.nominal_links()), rng)
         self.gearbox, self.oil = gearbox, gearbox.lubricant()

@@ -19,6 +19,7 @@ from builder.native.compile import NoCompilerError, host_platform
 from builder.surrogate.train import TrainingResult
 from builder.workflows import build as builder_build
 from builder.workflows.build import build, cycle_errors
+from builder.workflows.known_physics import known_finding
 from models.assembly.gearbox import Gearbox, load_gearbox
 from models.correction.correction import Correction, Estimate
 
@@ -120,3 +121,16 @@ def test_both_versions_of_fmi_are_written_next_to_each_other(tmp_path: Path) -> 
                             output=names) for path in files]  # fmt: skip
     np.testing.assert_array_equal(*results)
     assert results[0]["cell_1.T"][-1] > results[0]["cell_12.T"][-1] + 1.0
+
+
+@pytest.mark.skipif(native_compile._own_compiler() is None, reason="no C compiler")
+@pytest.mark.parametrize(("set_point", "rests"), [(90.0, True), (20.0, False)])
+def test_a_control_that_rests_in_the_reference_cycle_is_not_compared(
+    tmp_path: Path, set_point: float, rests: bool
+) -> None:
+    reducer = load_gearbox("reducer")
+    given = {"strength": (10.0, 1.0), "set_point": (set_point, 1.0), "band": (0.2, 0.1)}
+    cooler = known_finding(reducer, reducer.network(), "cooler_thermostat", given)
+    report = build(reducer, tmp_path, target="native", correction=Correction.of(reducer, findings=[cooler]))
+    told = [note for note in report.notes if "state_cooler_thermostat_oil_valve does not switch" in note]
+    assert len(told) == rests
