@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from itertools import product
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from models.base.types import Array
 
 START_SHARES = (1.0, 0.1)  # of the strength that the scan promises
 ROUGH, ITERATIONS = 3, 10
+SWITCH_SHARES = (0.5, 1.0, 2.0)  # of it, all tried, of what switches: it has many optima
 FAR_NAT = 20.0  # that a fit would gain by a further step: it is far from its optimum
 DATE_STEP_S = 10.0
 
@@ -31,7 +33,8 @@ def refit(
     The other unknowns start where the straight line puts them with the candidate there. What it does may be far from
     a straight line; so smaller shares of the promised strength are tried until a rough fit agrees better with the
     readings than without the candidate, and all further starts. The best rough fit goes on. What switches starts where
-    finer scans put its numbers, and they stay there while everything else is far from where it belongs.
+    finer scans put its numbers, with several shares of the strength, and from the fit as it is too; the numbers stay
+    there while everything else is far from where it belongs.
 
     Raises
     ------
@@ -46,22 +49,25 @@ def refit(
     # The fit may be far from an optimum: readings of a channel may be back that it never saw.
     step = fit.linearised.step(fit.z, 0.0, *fit.experiment.bounds)
     gained = 0.5 * float(step @ (fit.linearised.products[1:, 0] - fit.z))
-    ended = fit.z + step if gained > FAR_NAT else fit.z
+    bases = [fit.z + step, fit.z] if gained > FAR_NAT else [fit.z]
 
-    def rough_fit(which: int, size: float) -> list[Fit]:
+    def rough_fit(which: int, size: float, base: Array = bases[0]) -> list[Fit]:
         """A few steps from one start; empty if it has no solution."""
         aside, experiment, shape = line(which)
-        z = np.concatenate([ended + size * aside, [experiment.unknowns[len(fit.z)].z_of(size)], shape[1:]])
+        z = np.concatenate([base + size * aside, [experiment.unknowns[len(fit.z)].z_of(size)], shape[1:]])
         try:
             return [experiment.fit(z, fit.trajectories, iterations=ROUGH, held=held)]
         except ArithmeticError:
             return []
 
     rough: list[Fit] = []
+    if held:
+        for base, share in product(bases, SWITCH_SHARES):
+            rough += rough_fit(variant, share * strength, base)
     for share in START_SHARES:
-        rough += rough_fit(variant, share * strength)
-        if rough and rough[-1].objective < fit.objective:
+        if any(one.objective < fit.objective for one in rough):
             break
+        rough += rough_fit(variant, share * strength)
     for other, size in further:
         rough += rough_fit(other, size)
     if not rough:
