@@ -300,8 +300,8 @@ def _at_rest(network: ThermalNetwork, full: Mapping[str, Array]) -> list[str]:
     """A note if controls keep their position in the reference cycle, so that it does not test them."""
     columns = [f"{MEMORY}{state.name}" for state in network.states if state.update is not None]
     still = ", ".join(name for name in columns if np.ptp(full[name]) == 0.0)
-    advice = "it is not compared: drive the FMU over a recording in which it does (`simulate`)"
-    return [f"in the reference cycle {still} does not switch, so {advice}"] if still else []
+    advice = "drive the FMU over a recording in which they switch (`simulate`)"
+    return [f"controls that rest in the reference cycle are not compared ({still}): {advice}"] if still else []
 
 
 def _planned(target: str, platforms: str, fmi: str) -> tuple[tuple[str, ...], tuple[str, ...], list[str]]:

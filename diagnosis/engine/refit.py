@@ -18,8 +18,8 @@ from diagnosis.forward.network_on_grid import NetworkOnGrid
 from models.base.types import Array
 
 START_SHARES = (1.0, 0.1)  # of the strength that the scan promises
+SWITCH_SHARES = (0.5, 1.0, 2.0)  # of the same, all of them, for what switches: its objective has many minima
 ROUGH, ITERATIONS = 3, 10
-SWITCH_SHARES = (0.5, 1.0, 2.0)  # of it, all tried, of what switches: it has many optima
 FAR_NAT = 20.0  # that a fit would gain by a further step: it is far from its optimum
 DATE_STEP_S = 10.0
 

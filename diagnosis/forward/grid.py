@@ -287,8 +287,8 @@ def _means_of_lines(time: Array, values: Array, edges: Array) -> Array:
 def white_sd(*pieces: Array) -> float:
     """White noise of a signal from the second differences of its known values, robust against steps and outliers.
 
-    Half of the differences are less than their median, of normal noise 0.6745 standard deviations. Of a display, whose
-    differences are whole steps, more are: all up to the midst between the median and the next step.
+    Differences of a display are whole steps, so more than half of them may be at most the median. With a continuity
+    correction, that share of normal noise lies below the middle between the median and the next step.
 
     Parameters
     ----------

@@ -71,9 +71,9 @@ class Column(Section):
     noise: Positive | None = None
     resolution: NotNegative | None = None
     lag_s: NotNegative | None = None
-    lag_sd_s: NotNegative | None = None
-    bias_sd: NotNegative | None = None
-    gain_sd: NotNegative | None = None
+    lag_sd_s: Positive | None = None
+    bias_sd: Positive | None = None
+    gain_sd: Positive | None = None
     valid: tuple[float, float] | None = None
     rows: tuple[str, ...] | None = None
 

@@ -89,11 +89,9 @@ def _missing(d: Diagnosis) -> str:
     reached = f"evidence {d.log_e_value:.1f} nat, {d.threshold:.1f} needed ({why})"
     if d.verdict == "parameter_error":
         return f"No physics, but a parameter is outside its prior: {reached}."
-    if d.log_e_value > d.threshold and d.holdout_gain <= -1.0:
-        both = d.log_e_value + d.holdout_gain
-        return f"Yes{_in_what(d)}: {reached}; {both:.1f} nat remain of what the held-out readings take off."
     if d.log_e_value > d.threshold:
-        return f"Yes{_in_what(d)}: {reached}."
+        back = f"; the held-out readings take {-d.holdout_gain:.1f} nat of it back" if d.holdout_gain <= -1.0 else ""
+        return f"Yes{_in_what(d)}: {reached}{back}."
     if _cannot_be_fitted(d) and d.train.calibrated <= d.train.before:
         worse = ", ".join(f"{name} ({after:.2f} K, {before:.2f} K as delivered)"
                           for name, (before, after) in d.spoiled.items())  # fmt: skip
@@ -286,8 +284,9 @@ def _how_much_better(d: Diagnosis) -> tuple[str, ...]:
     if d.contradicted:
         if d.holdout.contradict(d.holdout_gain, d.noise_K, d.further_threshold):
             by = "less probable readings" if d.holdout_gain < -d.further_threshold else "larger error of temperatures"
-            but = "" if d.terms else ", and the correction is the calibrated model"
-            lines.append(f"So the held-out recordings contradict the findings ({by}): no name is a claim{but}")
+            of_terms = all(finding.term is not None for finding in d.findings)  # not a parameter, which has none
+            without = ", and the corrected model does without them" if of_terms and not d.terms else ""
+            lines.append(f"So the held-out recordings contradict the findings ({by}): no name is a claim{without}")
         else:
             lines.append("So the held-out recordings do not confirm the findings: no name is a claim")
     return tuple(lines)

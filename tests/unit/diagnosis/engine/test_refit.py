@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from diagnosis.candidates.hypotheses import hypothesis_of
 from diagnosis.engine.fit import Experiment, Fit, calibrate
-from diagnosis.engine.refit import refit
+from diagnosis.engine.refit import ROUGH, SWITCH_SHARES, refit
 from diagnosis.engine.scan import SHAPES_TRIED, Scan, course_of_heat, scan
 from diagnosis.results.findings import switch_errors
 from models.assembly.gearbox import Gearbox
+from models.base.types import Array
 from models.mechanisms import CATALOGUE, Placed, Scale
 from tests.unit.diagnosis.inference_example import CHANNELS, acting, at, with_measured, with_term
 
@@ -77,15 +80,20 @@ def test_the_end_of_a_row_of_losses_that_is_stamped_is_learnt(
     assert len(scanned.log_bayes) == 2 and scanned.log_bayes.max() < 0.0
 
 
-def test_a_set_point_is_found(experiment: Experiment, scale: Scale) -> None:
-    """A switch moves by jumps, so the derivative with respect to its set point is no guide; the grid has to lead."""
+def with_fan(experiment: Experiment, scale: Scale) -> tuple[Placed, float, Fit]:
+    """A fan, the middle of its band, and the machine calibrated to readings with it."""
     (placed,) = CATALOGUE["fan_thermostat"].placed(experiment.machine.model.network, scale)
     nominal = experiment.point(0, np.zeros(len(experiment.unknowns))).trajectory.T
     parts = experiment.machine.model.parts
     housing = nominal[:, [parts.index(f"housing_{half}") for half in ("lower", "upper")]].mean(axis=1)
     true = float(np.percentile(housing, 85))
     values = {"strength": scale.conductance, "set_point": true, "band": 2.0}
-    base = calibrate(acting(experiment, placed, values, guided=False))
+    return placed, true, calibrate(acting(experiment, placed, values, guided=False))
+
+
+def test_a_set_point_is_found(experiment: Experiment, scale: Scale) -> None:
+    """A switch moves by jumps, so the derivative with respect to its set point is no guide; the grid has to lead."""
+    placed, true, base = with_fan(experiment, scale)
     _, found = found_with(base, placed)
     # Once on, it stays on: only the upper edge is seen.
     edge = value_of(found, f"{placed.label}_set_point") + 0.5 * value_of(found, f"{placed.label}_band")
@@ -140,3 +148,19 @@ def test_the_heat_of_a_term_over_the_time(experiment: Experiment, scale: Scale) 
     heat = course_of_heat(sunny.fit(at(sunny, given), iterations=0), placed)
     bell = 80.0 * np.exp(-(((piece.middle - noon) / length) ** 2))
     assert heat == pytest.approx(bell * np.sqrt(piece.steps), rel=1e-6, abs=1e-6)
+
+
+def test_what_switches_starts_from_several_strengths(
+    experiment: Experiment, scale: Scale, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    placed, _, base = with_fan(experiment, scale)
+    starts, fit = list[float](), Experiment.fit
+
+    def noted(own: Experiment, z: Array, *given: Any, iterations: int, **options: Any) -> Fit:
+        if iterations == ROUGH:
+            starts.append(own.unknowns[len(base.z)].value(float(z[len(base.z)])))
+        return fit(own, z, *given, iterations=iterations, **options)
+
+    monkeypatch.setattr(Experiment, "fit", noted)
+    found_with(base, placed)
+    assert np.array(starts[:3]) / starts[1] == pytest.approx(SWITCH_SHARES) and len(starts) >= 3

@@ -232,7 +232,7 @@ def test_noise_of_a_channel_with_gaps_is_that_of_its_values() -> None:
 
 @pytest.mark.parametrize("noise", [0.05, 0.07, 0.08, 0.1, 0.15, 0.2])
 def test_noise_of_a_display_is_that_of_its_values(noise: float) -> None:
-    """Its differences are whole steps, so their median is one step for noise of 0.05 and of 0.1 alike."""
+    """Its differences are whole steps, so their median is one step for noise of 0.05 and of 0.08 alike."""
     values = np.linspace(20.0, 60.0, 4000) + np.random.default_rng(0).normal(0.0, noise, 4000)
     shown = np.round(10.0 * values) / 10.0
     assert white_sd(shown) == pytest.approx(np.hypot(noise, 0.1 / np.sqrt(12.0)), rel=0.05)

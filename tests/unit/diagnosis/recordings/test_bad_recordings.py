@@ -180,6 +180,13 @@ MAPPINGS: list[tuple[str, tuple[str, ...]]] = [
     ("schema = 1\ncsv = { skip_lines = [1] }", ("first line holds numbers",)),
     ('schema = 1\ncsv = { separator = ";" }', ("run.csv", "separated by ','", 'separator = ","')),
     ('schema = 1\nrows = ["2017-01-01.."]', ("run.csv", "time_s holds seconds")),
+    *(
+        (
+            f'schema = 1\ncolumns.T_oil_degC = {{ quantity = "T_oil", {key} = 0 }}',
+            (f"columns.T_oil_degC.{key}", "not 0"),
+        )
+        for key in ("bias_sd", "lag_sd_s")
+    ),
     ("schema = 1\nmax_gap_s = 1.0", ("no two rows are closer than 1 s",)),
     ("schema = 1\nmissing = " + "[" * 3000 + "]" * 3000, ("mapping.toml",)),
 ]

@@ -202,6 +202,13 @@ def test_a_larger_held_out_error_is_not_called_better() -> None:
     unconfirmed = told(replace(base, holdout_gain=-30.0, contradicted=True), "How much better?")
     assert "predicted worse than by the calibrated model, by 30 nat of log score\nSo" in unconfirmed
     assert "contradict the findings (less probable readings)" in unconfirmed
+    back = "the held-out readings take 30.0 nat of it back"
+    assert back in told(replace(base, holdout_gain=-30.0), "Is something missing?")
+    assert "of it back" not in told(base, "Is something missing?")
+    withdrawn = told(replace(base, holdout_gain=-30.0, contradicted=True, terms=()), "How much better?")
+    assert "and the corrected model does without them" in withdrawn
+    kept = replace(base, holdout_gain=-30.0, contradicted=True, terms=tuple(f.term for f in base.findings if f.term))
+    assert "does without them" not in told(kept, "How much better?")
     assert "by less than one nat of log score" in told(replace(base, holdout_gain=-0.3), "How much better?")
     assert "log score" not in told(replace(base, holdout_gain=0.0), "How much better?")  # nothing was fitted
 
