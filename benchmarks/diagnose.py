@@ -22,7 +22,7 @@ import numpy as np
 import pandas as pd
 import psutil
 
-from diagnosis import diagnose
+from diagnosis.diagnose_recordings import diagnose
 from diagnosis.proof.cases.case_files import DECIMALS
 from diagnosis.proof.cases.conceal import draw_case
 from diagnosis.proof.cases.concealed_case import Plan

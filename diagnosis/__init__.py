@@ -32,28 +32,4 @@ Words that the code has in one sense only:
   *answer* is an effect that is reported; a *finding* is an answer with its numbers.
 
 ``proof`` is apart: plants that hide a known effect, and the scores of any diagnosis of them. Nothing above imports it.
-
-Names are imported on first use, so that reading recordings does not load the inference.
 """
-
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from diagnosis.diagnose_recordings import diagnose
-    from diagnosis.results.result import Diagnosis
-
-__all__ = ["Diagnosis", "diagnose"]
-
-
-def __getattr__(name: str) -> Any:
-    if name == "diagnose":
-        from diagnosis.diagnose_recordings import diagnose
-
-        return diagnose
-    if name == "Diagnosis":
-        from diagnosis.results.result import Diagnosis
-
-        return Diagnosis
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -111,7 +111,7 @@ def diagnose(
     Of a fleet every gearbox gets its own report, and all together one table (summary.csv).
     """
     with progress(LOADING):
-        from diagnosis import diagnose as run
+        from diagnosis.diagnose_recordings import diagnose as run
         from diagnosis.recordings.read import read_by_role
         from diagnosis.report.write import files_left_over, write_files
         from models.base.atomic_write import atomic_folder

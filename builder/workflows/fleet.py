@@ -16,8 +16,8 @@ from typing import Any
 
 from builder.base import console
 from builder.base.progress import progress
-from diagnosis import diagnose
 from diagnosis.decision.settings import Settings
+from diagnosis.diagnose_recordings import diagnose
 from diagnosis.recordings.read import ByRole, read_by_role
 from diagnosis.recordings.time_axis import RECORDING_KINDS
 from diagnosis.report.write import files_left_over, write_files
@@ -166,7 +166,7 @@ def diagnose_fleet(
     mapping : Path or None
         See :func:`diagnosis.recordings.read.read_recordings`
     catalogue, correction, switched_off, settings
-        See :func:`diagnosis.diagnose`
+        See :func:`diagnosis.diagnose_recordings.diagnose`
     jobs : int
         Gearboxes at the same time on this machine
     dask : str or None

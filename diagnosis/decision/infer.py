@@ -20,7 +20,7 @@ from scipy.special import log_ndtr
 
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.placebo import CandidatesIn, judge_baselines
-from diagnosis.decision.posterior import Judged, Posterior
+from diagnosis.decision.posterior import Assumed, Judged, Posterior
 from diagnosis.decision.scanned import (
     WHOLE,
     Scanned,
@@ -125,22 +125,24 @@ def infer(
         judged=tuple(replace(one, log_bayes=one.log_bayes - gained) for one in (*every, *unknown)),
         log_e=log_e,
         log_parameter=log_sum(parameters) - gained - ahead,
-        rival_ahead=ahead,
         threshold=threshold,
         class_threshold=of_class,
         rule=rule(),
         likeness=likeness_of(first, error_class),
         settings=settings,
-        error_class=(error_class if missing else chosen.error_class).name,
-        error_evidence=dict(calibration.evidence),
-        session_s=chosen.session_s,
-        scaled=tuple(
-            with_scaled_error(calibration, found, factor, first, settings.false_alarm_rate, least)
-            for factor in (SCALED if calibration.assumes_error else ())
+        assumed=Assumed(
+            error_class=(error_class if missing else chosen.error_class).name,
+            error_evidence=dict(calibration.evidence),
+            scaled_error=tuple(
+                with_scaled_error(calibration, found, factor, first, settings.false_alarm_rate, least)
+                for factor in (SCALED if calibration.assumes_error else ())
+            ),
+            session_s=chosen.session_s,
+            repeating=repeating_of(first, error_class),
+            placebo=placebo,
+            draughts_ahead=ahead,
         ),
-        repeating=repeating_of(first, error_class),
         expected=expected_of(first, chosen.error_class, settings),
-        placebo=placebo,
         # Where channels were set apart the others chose the basin: a broken one is not to draw the machine elsewhere.
         elsewhere=elsewhere if gained > FAR_BETTER and calibration.of_others is None else None,
     )

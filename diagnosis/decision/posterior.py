@@ -12,7 +12,7 @@ learnt on plants of the zoo and of a stranger, see ``diagnosis/engine/learnt.tom
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal, get_args
@@ -197,6 +197,37 @@ class Placebo:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Assumed:
+    """What the evidence assumes beside the explanations, and what it would be with other assumptions.
+
+    Attributes
+    ----------
+    error_class : str
+        Class of model error of the best explanation; of nothing where nothing is missing
+    error_evidence : mapping of str to float
+        Log evidence of every class without any effect, prior included, less that of the best, [nat]
+    scaled_error : tuple of ScaledError
+    session_s : float
+        Mean deviation between sessions that the readings support, in prior standard deviations; 0 of one session
+    repeating : tuple of Repeating
+        With the deviation between sessions that the readings support, and with twice that or more; empty of one
+        session, and if none is larger
+    placebo : Placebo or None
+        What a healthy session brings, which the tested recordings have to exceed; None without baselines
+    draughts_ahead : float
+        What the machine without an effect has more in draughts than in still air, which is off the evidence, [nat]
+    """
+
+    error_class: str = ""
+    error_evidence: Mapping[str, float] = field(default_factory=dict)
+    scaled_error: tuple[ScaledError, ...] = ()
+    session_s: float = 0.0
+    repeating: tuple[Repeating, ...] = ()
+    placebo: Placebo | None = None
+    draughts_ahead: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Likeness:
     """How much alike effects look in these readings, with everything unknown marginalised.
 
@@ -235,21 +266,9 @@ class Posterior:
     threshold, class_threshold : float
         From which something is missing, [nat]; that of the class of model error, from which a parameter is outside its
         prior and a further effect competes
-    rival_ahead : float
-        What the machine without an effect has more in other random heat, which is off `log_e`, [nat]
     settings : Settings
         As asked for
-    error_class : str
-        Class of model error of the best explanation; of nothing where nothing is missing
-    error_evidence : mapping of str to float
-        Log evidence of every class without any effect, prior included, less that of the best
-    session_s : float
-        Mean deviation between sessions that the readings support, in prior standard deviations; 0 of one session
-    repeating : tuple of Repeating
-        With the deviation between sessions that the readings support, and with twice that or more; empty of one
-        session, and if none is larger
-    placebo : Placebo or None
-        The tested recordings have to bring more; None without baselines
+    assumed : Assumed
     elsewhere : Fit or None
         A far better fit of nothing, seen from the best explanation: everything is to be judged again from there
     """
@@ -261,16 +280,10 @@ class Posterior:
     class_threshold: float
     rule: Rule
     log_parameter: float = -np.inf
-    rival_ahead: float = 0.0
     likeness: Likeness = Likeness(labels=(), cosines=np.zeros((0, 0)))
     settings: Settings = field(default_factory=Settings)
-    error_class: str = ""
-    error_evidence: dict[str, float] = field(default_factory=dict)
-    session_s: float = 0.0
-    scaled: tuple[ScaledError, ...] = ()
-    repeating: tuple[Repeating, ...] = ()
+    assumed: Assumed = field(default_factory=Assumed)
     expected: tuple[Expected, ...] = ()
-    placebo: Placebo | None = None
     elsewhere: Fit | None = None
 
     def left_by(self, one: Judged | None = None) -> float:

@@ -127,16 +127,6 @@ class NearReadings:
 
         return log_evidence
 
-    def likely_random_heat(self, one: ErrorClass, z: Array) -> RandomHeat:
-        """Random heats that make the readings most probable with model error of a class, without draughts.
-
-        Parameters
-        ----------
-        z : Array, shape (unknowns,)
-            Where everything is linearised
-        """
-        return self.most_probable(self.evidence_of(one, z), AS_ASSUMED)
-
     def most_probable(self, log_evidence: Callable[[RandomHeat], float], start: RandomHeat) -> RandomHeat:
         """Random heats with the most evidence, searched for from a start; without draughts there, without.
 
@@ -283,7 +273,8 @@ def _calibrated(experiment: Experiment, error: ModelError, start: Fit) -> Calibr
     first = [NearReadings.of(experiment, error, one).fitted(widest, one) for one in (start, middles)]
     fit = max(first, key=lambda one: one.log_evidence).fit
     near = NearReadings.of(experiment, error, fit)
-    return _with_random_heat(experiment.with_random_heat(near.likely_random_heat(widest, fit.z)), error, fit)
+    random_heat = near.most_probable(near.evidence_of(widest, fit.z), AS_ASSUMED)
+    return _with_random_heat(experiment.with_random_heat(random_heat), error, fit)
 
 
 def _with_random_heat(experiment: Experiment, error: ModelError, fit: Fit) -> Calibration:

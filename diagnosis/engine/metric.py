@@ -26,26 +26,6 @@ LEAST_DIRECTION, MOST_DIRECTIONS = 0.1, 300  # squared norm of a direction again
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ErrorCourses:
-    """Courses of n unknowns of model error along a piece, per unit; see :class:`diagnosis.forward.grid.ErrorCourse`.
-
-    Attributes
-    ----------
-    heat : Array, shape (K, parts, n)
-    loss : Array, shape (K, n)
-    reading : Array, shape (K + 1, channels, n)
-    """
-
-    heat: Array
-    loss: Array
-    reading: Array
-
-    def along(self, values: Array) -> ErrorCourse:
-        """All of them together, with values of shape (n,)."""
-        return ErrorCourse(heat=self.heat @ values, loss=self.loss @ values, reading=self.reading @ values)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
 class Metric:
     """Inner products of whitened readings of all pieces; by default noise is all that there is.
 
@@ -61,8 +41,8 @@ class Metric:
         First of those from which every session deviates, model error before others; n if sessions do not differ
     deviation : float
         Of a session, in prior standard deviations
-    courses : tuple of ErrorCourses
-        What the shared columns do along every piece, for simulations with model error; empty: none
+    courses : tuple of ErrorCourse
+        What the n shared columns do along every piece, for simulations with model error; empty: none
     """
 
     sessions: tuple[tuple[int, ...], ...] = ()
@@ -70,7 +50,7 @@ class Metric:
     shared: int = 0
     own: int = 0
     deviation: float = 0.0
-    courses: tuple[ErrorCourses, ...] = ()
+    courses: tuple[ErrorCourse, ...] = ()
 
     @property
     def shared_columns(self) -> list[Array]:

@@ -40,21 +40,25 @@ SLOW_S = 60.0  # rows further apart are means that hide what switches do, see :c
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ErrorCourse:
-    """Model error along a piece that is assumed while the piece is simulated.
+    """Model error along a piece, which may be assumed while the piece is simulated; or courses per unit of n unknowns.
 
     Attributes
     ----------
-    heat : Array, shape (K, parts)
+    heat : Array, shape (K, parts) or (K, parts, n)
         Into every part, [W]
-    loss : Array, shape (K,)
+    loss : Array, shape (K,) or (K, n)
         Part of it that is mechanical loss, [W]
-    reading : Array, shape (K + 1, channels)
+    reading : Array, shape (K + 1, channels) or (K + 1, channels, n)
         Change of the readings of sound sensors, [K] or [W]
     """
 
     heat: Array
     loss: Array
     reading: Array
+
+    def along(self, values: Array) -> ErrorCourse:
+        """All unknowns together, with values of shape (n,)."""
+        return ErrorCourse(heat=self.heat @ values, loss=self.loss @ values, reading=self.reading @ values)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -113,14 +113,16 @@ class Whitening:
         size, steps = n + len(shaken) + (noise.draught > 0.0), piece.steps
         count = len(steps)
         rho = np.exp(-steps / noise.heat_time)
+        outside, balance = np.abs(model.to_parts.sum(axis=1)) > 0.5, trajectory.balance  # not between parts
+        flows, into = (balance.conductances * balance.differences)[:, outside], model.to_parts[outside]
         # The states are of variance 1; how much heat they are goes with the heat that the surroundings take.
-        heat_sd = np.hypot(noise.heat_sd, noise.wander * _to_surroundings(model, trajectory))[:, shaken]
+        heat_sd = np.hypot(noise.heat_sd, noise.wander * np.sqrt(np.square(flows) @ np.abs(into)))[:, shaken]
         per_capacity = trajectory.gain[:, :, shaken] * (heat_sd / trajectory.capacities[shaken])[:, None, :]
         transition = np.zeros((count, size, size))
         transition[:, :n, :n] = trajectory.decay
         transition[:, :n, n : n + len(shaken)] = per_capacity
         if noise.draught > 0.0:
-            rates = noise.draught * _from_surroundings(model, trajectory) / trajectory.capacities
+            rates = noise.draught * (flows @ into) / trajectory.capacities
             transition[:, :n, -1] = np.einsum("kij,kj->ki", trajectory.gain[:, :, : model.n], rates)
         transition[:, range(n, size), range(n, size)] = rho[:, None]
         renewed = np.zeros((count, size, size))
@@ -183,25 +185,6 @@ class Whitening:
                 now, after = after, now
         result[~self._seen] = 0.0
         return result.reshape(points * m, count)
-
-
-def _to_surroundings(model: NetworkOnGrid, trajectory: Trajectory) -> Array:
-    """Heat that links to boundaries take from every part, or bring, shape (K, parts), [W]."""
-    flows, into = _outside(model, trajectory)
-    return np.asarray(np.sqrt(np.square(flows) @ np.abs(into)))
-
-
-def _from_surroundings(model: NetworkOnGrid, trajectory: Trajectory) -> Array:
-    """Heat that links to boundaries bring to every part, negative where they take it, shape (K, parts), [W]."""
-    flows, into = _outside(model, trajectory)
-    return flows @ into
-
-
-def _outside(model: NetworkOnGrid, trajectory: Trajectory) -> tuple[Array, Array]:
-    """Heat flows through links to boundaries, shape (K, links), [W], and where they go, shape (links, parts)."""
-    outside = np.abs(model.to_parts.sum(axis=1)) > 0.5  # between parts, what one loses the other gains
-    balance = trajectory.balance
-    return (balance.conductances * balance.differences)[:, outside], model.to_parts[outside]
 
 
 def reading_variance(model: NetworkOnGrid, trajectory: Trajectory, sensors: Sensors, noise: Noise) -> Array:

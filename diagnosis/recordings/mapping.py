@@ -246,13 +246,8 @@ class RecordingMapping(Section):
     @property
     def text_form(self) -> TextForm:
         """Form of its CSV files."""
-        csv = self.csv
-        return TextForm(
-            separator=csv.separator, decimal=csv.decimal, thousands=csv.thousands, missing=self.missing,
-            encoding=csv.encoding,
-            texts=self.time.columns if self.time is not None and "%" in (self.time.unit or "") else (),
-            skip_lines=csv.skip_lines, by_mapping=True,
-        )  # fmt: skip
+        texts = self.time.columns if self.time is not None and "%" in (self.time.unit or "") else ()
+        return TextForm(**dict(self.csv), missing=self.missing, texts=texts, by_mapping=True)
 
 
 def looks_like_kelvin(quantity: Quantity, lowest: float, highest: float) -> bool:

@@ -97,8 +97,8 @@ def correction_of(diagnosis: Diagnosis, gearbox: Gearbox) -> Correction:
             for c in diagnosis.calibration
             if c.parameter in nominal
         ),
-        sensors=diagnosis.sensors,
-        inputs=diagnosis.true_inputs,
+        sensors=diagnosis.model.sensors,
+        inputs=diagnosis.model.true_inputs,
         recordings=dict(diagnosis.inputs["recordings"]),
         version=str(diagnosis.inputs["version"]),
     )

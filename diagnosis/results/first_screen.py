@@ -84,8 +84,8 @@ def _missing(d: Diagnosis) -> str:
     if d.verdict == "insufficient_data":
         return "These data cannot decide it."
     why = f"false-alarm rate of {100.0 * d.settings.false_alarm_rate:g} % asked for"
-    if d.placebo is not None and d.threshold == d.placebo.log_e_value:
-        why = f"as much as the baseline '{d.placebo.session}' brings"
+    if d.assumed.placebo is not None and d.threshold == d.assumed.placebo.log_e_value:
+        why = f"as much as the baseline '{d.assumed.placebo.session}' brings"
     reached = f"evidence {d.log_e_value:.1f} nat, {d.threshold:.1f} needed ({why})"
     if d.verdict == "parameter_error":
         return f"No physics, but a parameter is outside its prior: {reached}."
@@ -204,15 +204,7 @@ def _how_sure(d: Diagnosis) -> tuple[str, ...]:
     if d.known.has_physics:
         known = ", ".join(d.known.summary()["findings"]) or "calibrated values"
         lines.append(f"Known before, and part of the model as delivered: {known}.")
-    if d.error_class:
-        what = "part of a finding" if d.findings else "a real effect"
-        hides = f", the largest, because the model fits badly: {what} can hide in it"
-        lines.append(
-            f"Model error assumed: class {d.error_class}{hides if d.error_class == widest_class().name else ''}."
-        )
-    if d.log_e_value > d.threshold:
-        lines += _against_others(d)
-    lines += _sessions_told(d)
+    lines += _assumed_told(d)
     far = sorted((c for c in d.calibration if c.is_far), key=lambda c: -abs(c.shift_in_sd))
     if far:
         deviations = {p.name for p in d.network.parameters if p.start == 0.0}  # from what the definition assumes
@@ -224,25 +216,26 @@ def _how_sure(d: Diagnosis) -> tuple[str, ...]:
     return tuple(lines)
 
 
-def _against_others(d: Diagnosis) -> list[str]:
-    """The evidence against still air, and with model error of other sizes."""
-    lines = []
-    if d.draughts_ahead > 0.0:
+def _assumed_told(d: Diagnosis) -> list[str]:
+    """Model error, draughts and sessions as assumed; where something is missing, the evidence with others too."""
+    lines, assumed, missing = [], d.assumed, d.log_e_value > d.threshold
+    if assumed.error_class:
+        what = "part of a finding" if d.findings else "a real effect"
+        hides = f", the largest, because the model fits badly: {what} can hide in it"
+        lines.append(f"Model error assumed: class {assumed.error_class}"
+                     f"{hides if assumed.error_class == widest_class().name else ''}.")  # fmt: skip
+    if missing and assumed.draughts_ahead > 0.0:
+        still = d.log_e_value + assumed.draughts_ahead
+        lines.append(f"Against the machine in still air it is {still:.1f} nat; without an effect draughts are more "
+                     f"probable, by {assumed.draughts_ahead:.1f} nat.")  # fmt: skip
+    if missing and assumed.scaled_error:
+        lines.append(robustness_told(assumed.scaled_error))
+    if missing and assumed.repeating:
+        lines.append(repeating_told(*assumed.repeating))
+    if assumed.session_s > LITTLE_SPREAD:
         lines.append(
-            f"Against the machine in still air it is {d.log_e_value + d.draughts_ahead:.1f} nat; without an effect "
-            f"draughts are more probable, by {d.draughts_ahead:.1f} nat."
+            f"Between sessions parameters differ by {assumed.session_s:.2f} standard deviations of their priors."
         )
-    if d.scaled_error:
-        lines.append(robustness_told(d.scaled_error))
-    return lines
-
-
-def _sessions_told(d: Diagnosis) -> list[str]:
-    lines = []
-    if d.repeating and d.log_e_value > d.threshold:
-        lines.append(repeating_told(*d.repeating))
-    if d.session_s > LITTLE_SPREAD:
-        lines.append(f"Between sessions parameters differ by {d.session_s:.2f} standard deviations of their priors.")
     return lines
 
 

@@ -29,7 +29,7 @@ def baseline_notes(experiment: Experiment, posterior: Posterior, answers: Sequen
     best = (answers[0].best.fit if answers else None) or nothing
     single = [one for one in posterior.judged if len(one.effects) == 1]
     ahead = max(single, key=lambda one: one.weight + one.effects[0].less, default=None)
-    placebo = posterior.placebo
+    placebo = posterior.assumed.placebo
     raised = placebo is not None and posterior.threshold == placebo.log_e_value
     return baselines_told(0.0 if effect is None else evidence_in_baselines(nothing, effect), sessions_apart(best),
                           "" if effect is None else effect.name,

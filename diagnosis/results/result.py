@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
-from diagnosis.decision.posterior import Placebo, Repeating, ScaledError
+from diagnosis.decision.posterior import Assumed
 from diagnosis.decision.settings import Settings
 from diagnosis.results.first_screen import first_screen_of, verdict_text_of
 from diagnosis.results.joint_estimate import JointEstimate
@@ -32,7 +32,6 @@ from diagnosis.results.result_parts import (
 )
 from models.base.errors import InputError, did_you_mean
 from models.correction.correction import Correction
-from models.correction.instruments import InputCorrection, SensorCorrection
 from models.simulation.thermal_network import ThermalNetwork
 from models.terms.term import Term
 
@@ -55,7 +54,7 @@ def _bound_on_chance(nats: float) -> float:
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Diagnosis:
-    """The result of :func:`diagnosis.diagnose`.
+    """The result of :func:`diagnosis.diagnose_recordings.diagnose`.
 
     Attributes
     ----------
@@ -69,7 +68,8 @@ class Diagnosis:
     location : tuple of Location
         Most probable first
     findings : tuple of Finding
-    calibration : tuple of Calibrated
+    model : CalibratedModel
+        The model that predicts, without what is in `terms`
     train, holdout : Fits
     noise_K : float
         White noise of a temperature row
@@ -104,23 +104,12 @@ class Diagnosis:
         Probability of every kind of explanation: nothing, parameter, measurement, mechanism, pair, outside
     settings : Settings
         As asked for
-    error_class : str
-        Class of model error of the best explanation; of nothing where nothing is missing
-    error_evidence : mapping of str to float
-        Log evidence of every class without any effect, less that of the best, [nat]
-    scaled_error : tuple of ScaledError
-    session_s : float
-        Deviation between sessions that the data support, in prior standard deviations
-    repeating : tuple of Repeating
-        Evidence of the scan if sessions differ as the data support, and by twice as much or more; else empty
-    placebo : Placebo or None
-        What a healthy session brings, if there is one
+    assumed : Assumed
+        What the evidence assumes of model error, sessions and draughts, and what it would be with other assumptions
     holdout_gain : float
         Log predictive density of the held-out readings: final model less the calibrated one, [nat]; NaN without any
     contradicted : bool
         True if held-out recordings contradict the findings, see :meth:`Fits.contradict`: none is a claim
-    draughts_ahead : float
-        What the machine without an effect has more in draughts than in still air, which is off `log_e_value`, [nat]
     refuted : Refuted or None
         What would have been detected without the held-out recordings, if there is anything
     spoiled : mapping of recording to (before, calibrated)
@@ -132,10 +121,6 @@ class Diagnosis:
         standard errors as `sd`; of an effect without a name that is certain enough too
     known : Correction
         What was known of the machine before, and is in the nominal network
-    sensors : tuple of SensorCorrection
-        How its sensors differ from the machine, without what is in `terms`
-    true_inputs : tuple of InputCorrection
-        What it took the inputs to be
     alone : CalibratedModel
         The nominal machine calibrated without findings: ``calibrated.toml``
     joint : JointEstimate
@@ -151,7 +136,7 @@ class Diagnosis:
     further_threshold: float
     location: tuple[Location, ...]
     findings: tuple[Finding, ...]
-    calibration: tuple[Calibrated, ...]
+    model: CalibratedModel
     train: Fits
     holdout: Fits
     noise_K: float
@@ -172,28 +157,21 @@ class Diagnosis:
     notes: tuple[str, ...] = ()
     kinds: Mapping[str, float] = field(default_factory=dict)
     settings: Settings = field(default_factory=Settings)
-    error_class: str = ""
-    error_evidence: Mapping[str, float] = field(default_factory=dict)
-    scaled_error: tuple[ScaledError, ...] = ()
-    session_s: float = 0.0
-    repeating: tuple[Repeating, ...] = ()
-    placebo: Placebo | None = None
+    assumed: Assumed = field(default_factory=Assumed)
     holdout_gain: float = math.nan
     contradicted: bool = False
-    draughts_ahead: float = 0.0
     refuted: Refuted | None = None
     spoiled: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     faulty: tuple[str, ...] = ()
     terms: tuple[Term, ...] = ()
     known: Correction = field(default_factory=Correction)
-    sensors: tuple[SensorCorrection, ...] = ()
-    true_inputs: tuple[InputCorrection, ...] = ()
     alone: CalibratedModel = field(default_factory=CalibratedModel)
     joint: JointEstimate = field(default_factory=JointEstimate)
     starts_at: Mapping[str, float] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """Everything of ``diagnosis.json``, schema :data:`SCHEMA`."""
+        assumed = self.assumed
         return {
             "schema": SCHEMA,
             "gearbox": self.gearbox,
@@ -207,7 +185,7 @@ class Diagnosis:
                         "outside their priors (verdict parameter_error: of such parameters to none); something is "
                         "missing if it exceeds threshold. p_value = exp(-log_e_value), at most 1: a bound on chance "
                         "for an exact model only, no false-alarm rate",
-                "draughts_ahead": self.draughts_ahead,
+                "draughts_ahead": assumed.draughts_ahead,
                 "refuted": None if self.refuted is None else asdict(self.refuted),
             },
             "location": [
@@ -230,15 +208,15 @@ class Diagnosis:
                     "faulty_channels": list(self.faulty), "noise_K": self.noise_K, "floor": self.floor},
             "kinds": dict(self.kinds),
             "settings": asdict(self.settings),
-            "model_error": {"class": self.error_class, "evidence": dict(self.error_evidence),
-                            "scaled": [asdict(one) for one in self.scaled_error],
+            "model_error": {"class": assumed.error_class, "evidence": dict(assumed.error_evidence),
+                            "scaled": [asdict(one) for one in assumed.scaled_error],
                             "learnt": [
                                 {"what": term.strength.description, "kind": term.kind, "target": list(term.target),
                                  "size": term.strength.start, "stderr": term.strength.sd} for term in self.learnt
                             ],
                             "left_out_rmse_K": or_none(self.left_out_K)},
-            "sessions": {"deviation_in_sd": self.session_s, "repeating": [asdict(one) for one in self.repeating],
-                         "placebo": None if self.placebo is None else asdict(self.placebo)},
+            "sessions": {"deviation_in_sd": assumed.session_s, "repeating": [asdict(one) for one in assumed.repeating],
+                         "placebo": None if assumed.placebo is None else asdict(assumed.placebo)},
             "remaining": {
                 "p_value": _bound_on_chance(self.remaining_nat),
                 "note": self.remaining_note,
@@ -262,10 +240,14 @@ class Diagnosis:
         return bool(self.findings or self.terms or self.learnt)
 
     @property
+    def calibration(self) -> tuple[Calibrated, ...]:
+        """Parameters of the model that predicts."""
+        return self.model.calibration
+
+    @property
     def calibrated_alone(self) -> Diagnosis:
         """A diagnosis in which the model that predicts is the nominal one, calibrated without findings."""
-        return replace(self, findings=(), terms=(), learnt=(), calibration=self.alone.calibration,
-                       sensors=self.alone.sensors, true_inputs=self.alone.true_inputs)  # fmt: skip
+        return replace(self, findings=(), terms=(), learnt=(), model=self.alone)
 
     @property
     def verdict_text(self) -> str:

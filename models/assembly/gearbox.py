@@ -29,7 +29,7 @@ from models.definition.definition_file import fault_lines, placed, read_values, 
 from models.definition.messages import validate_section
 from models.definition.nested_values import leaves_of, plain, with_value
 from models.definition.parametric_sections import KEY, ParametricDefinition
-from models.definition.sections import Ambient, Bearing, Housing, Node, Oil, Seal, Shaft, Stage, Training
+from models.definition.sections import Ambient, Bearing, Housing, Oil, Seal, Shaft, Stage, Training
 from models.definition.values_with_source import Annotations
 from models.files.cycle import Cycle
 from models.files.toml_file import known_names, names_a_file, packaged, read_text
@@ -145,11 +145,6 @@ class Gearbox:
     def housing(self) -> Housing:
         """``[housing]``."""
         return self.geometry.housing
-
-    @property
-    def node(self) -> tuple[Node, ...]:
-        """``[[node]]``: overridden heat capacities."""
-        return self.geometry.node
 
     @property
     def training(self) -> Training:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from diagnosis import diagnose
+from diagnosis.diagnose_recordings import diagnose
 from models.assembly.gearbox import Gearbox
 from tests.golden.recordings import record
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagnosis import diagnose
+from diagnosis.diagnose_recordings import diagnose
 from diagnosis.engine.fit import calibrate
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.scale import scale_direction

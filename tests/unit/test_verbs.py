@@ -11,8 +11,8 @@ import pytest
 from click.testing import CliRunner
 
 import builder.workflows.build
-import diagnosis
 from builder.commands.cli import commands
+from diagnosis import diagnose_recordings
 from diagnosis.decision.settings import Settings
 from models.assembly.gearbox import Gearbox
 from models.correction.correction import Correction, Estimate, write_correction
@@ -50,7 +50,7 @@ def test_diagnose_passes_catalogue_and_rate_on(
     recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: list[dict[str, Any]] = []
-    monkeypatch.setattr(diagnosis, "diagnose", recorder(asked))
+    monkeypatch.setattr(diagnose_recordings, "diagnose", recorder(asked))
     usual = ("diagnose", recording, "--output", tmp_path / "out")
     invoked(*usual)
     own = ROOT / "examples/mechanisms.toml"

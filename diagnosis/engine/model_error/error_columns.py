@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from diagnosis.engine.fit import Experiment, Linear
 from diagnosis.engine.learnt import ErrorClass
-from diagnosis.engine.metric import ErrorCourses
 from diagnosis.engine.model_error.anatomy import Anatomy
 from diagnosis.engine.model_error.courses import Standard, View
 from diagnosis.engine.model_error.groups import GROUPS, Change, HeatChange
 from diagnosis.engine.point import Point, columns_at_once
+from diagnosis.forward.grid import ErrorCourse
 from models.base.types import Array
 
 
@@ -68,7 +68,7 @@ class ModelError:
         """Amplitude of every unknown in a class, 0 of those that are absent, shape (unknowns,)."""
         return np.array([one.amplitudes.get(group, 0.0) for group in self.groups])
 
-    def columns(self, point: Point, first: int, last: int, wanted: NDArray[np.bool_] | None = None) -> ErrorCourses:
+    def columns(self, point: Point, first: int, last: int, wanted: NDArray[np.bool_] | None = None) -> ErrorCourse:
         """Change per unit of the unknowns from `first` up to `last` (excluded), heat with rates of coupled states.
 
         The point may be that of an extended machine: everything is found by its name.
@@ -93,7 +93,7 @@ class ModelError:
                 loss[:, mine] = heat.loss[:, None] * course
             else:
                 reading[:, point.sensors.channels.index(change.channel), mine.start] = change.reading(view)
-        return ErrorCourses(heat=into, loss=loss, reading=reading)
+        return ErrorCourse(heat=into, loss=loss, reading=reading)
 
     def whitened(self, part: Linear) -> Array:
         """Whitened columns of all unknowns per unit, shape (M, unknowns)."""
@@ -106,12 +106,12 @@ class ModelError:
         """Change of what is recorded per unit of combinations of the unknowns, shape (K + 1, channels, n)."""
         return _recorded(point, self._combined(point, combinations))
 
-    def courses(self, point: Point, combinations: Array) -> ErrorCourses:
+    def courses(self, point: Point, combinations: Array) -> ErrorCourse:
         """Courses of combinations of the unknowns, shape (unknowns, n), along a piece, to simulate with."""
         found = self._combined(point, combinations)
         return replace(found, heat=np.ascontiguousarray(found.heat[:, : point.machine.model.n]))
 
-    def _combined(self, point: Point, combinations: Array) -> ErrorCourses:
+    def _combined(self, point: Point, combinations: Array) -> ErrorCourse:
         """Change per unit of combinations; see :meth:`columns`."""
         (points, channels), count = point.read.shape, combinations.shape[1]
         wanted = np.asarray(combinations.any(axis=1))
@@ -125,7 +125,7 @@ class ModelError:
             loss += found.loss @ some
             acting = np.flatnonzero(found.reading.any(axis=(0, 1)))
             reading += found.reading[:, :, acting] @ some[acting]
-        return ErrorCourses(heat=heat, loss=loss, reading=reading)
+        return ErrorCourse(heat=heat, loss=loss, reading=reading)
 
     def _chunks(self, point: Point) -> Iterator[tuple[int, int]]:
         """Ranges of so many unknowns as memory allows at once."""
@@ -142,6 +142,6 @@ class ModelError:
             begin = end
 
 
-def _recorded(point: Point, found: ErrorCourses) -> Array:
+def _recorded(point: Point, found: ErrorCourse) -> Array:
     """Change of what is recorded by heats and readings, shape (K + 1, channels, n)."""
     return point.heated(found.heat, found.loss) + point.setting.passed_on(point.trajectory, found.reading)

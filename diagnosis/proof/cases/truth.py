@@ -7,10 +7,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from diagnosis.proof.cases.concealed_case import ConcealedCase
-from diagnosis.proof.plant.cycles import ROW_S, Programme
+from diagnosis.proof.plant.cycles import Programme
 from diagnosis.proof.plant.effect import Concealed
 from diagnosis.proof.plant.instruments import Instruments, record
 from diagnosis.proof.plant.plant import Plant
@@ -19,11 +18,7 @@ from models.base.types import Array
 
 SCHEMA = 1
 SETS = ("train", "hold")
-PRACTICAL_K = 0.3
 FAR_CONTROL = "parameter_far"
-# Errors of a recorded input that no gearbox's owner would care for, by column.
-COLUMN_SIZE = {"T_ambient_degC": PRACTICAL_K, "torque_Nm": 1.0, "speed_rpm": 20.0}
-ACTIVE_SHARE = 0.1  # an effect acts where its heat is above this share of its highest
 
 
 def truth_of(plant: Plant, case: ConcealedCase, by_twin: Sequence[Sequence[Outcome]]) -> dict[str, Any]:
@@ -51,8 +46,8 @@ def truth_of(plant: Plant, case: ConcealedCase, by_twin: Sequence[Sequence[Outco
             twin = without_any if len(physics) == 1 else by_twin[2 + k] if 2 + k < len(by_twin) else None
             K = None if twin is None else _kelvin(plant, case, everything, twin)
             triples = zip(names, everything, twin or without_any, strict=True)
-            heat = facts_of_heat({name: _heat_of(effect, k, a, b) for name, a, b in triples}, rows, ROW_S)
-            facts.append(_effect(effect, case) | {"K": K} | heat | _felt(everything, without_any, effect))
+            heat = facts_of_heat({name: _heat_of(effect, k, a, b) for name, a, b in triples}, rows)
+            facts.append(_effect(effect, case) | {"K": K} | heat)
         else:
             facts.append(_effect(effect, case) | _measured(plant, case, everything, effect))
     instruments = case.instruments
@@ -64,7 +59,6 @@ def truth_of(plant: Plant, case: ConcealedCase, by_twin: Sequence[Sequence[Outco
         "group": case.plan.group,
         "control": case.plan.kind if case.plan.group == "control" else None,
         "effects": facts,
-        "practical": practical_of(facts),
         "far_parameter": _farthest(plant, case) if case.plan.kind == FAR_CONTROL else None,
         "K_all": _kelvin(plant, case, everything, without_any),
         "base_parameters": {name: round(value, 5) for name, value in case.individual.factors.items()},
@@ -73,11 +67,6 @@ def truth_of(plant: Plant, case: ConcealedCase, by_twin: Sequence[Sequence[Outco
             **facts_of_noise(instruments, instruments.lag_s, [run.programme for run in case.runs]),
             "ambient_offset_K": round(instruments.ambient_offset_K, 3),
             "torque_gain": round(instruments.torque_gain, 5),
-        },
-        "hottest_oil_degC": round(max(float(_at(plant, o, "oil").max()) for o in everything), 1),
-        "start_degC": {
-            run.programme.name: round(float(_at(plant, o, "oil")[0]), 1)
-            for run, o in zip(case.runs, everything, strict=True)
         },
     }
 
@@ -109,17 +98,6 @@ def _farthest(plant: Plant, case: ConcealedCase) -> str:
         return abs(off) / factor_sd(plant.gearbox, name)
 
     return max(case.individual.factors, key=distance)
-
-
-def practical_of(facts: Sequence[Mapping[str, Any]]) -> list[bool | None]:
-    """True per effect if it moves a measured temperature by more than is of practical interest; None: not known."""
-    found: list[bool | None] = []
-    for fact in facts:
-        shifts = fact.get("column_shift", {}).get("train", {})
-        moved = any(shifts[c]["rms"] > size for c, size in COLUMN_SIZE.items() if c in shifts)
-        K = fact["K"]
-        found.append(None if K is None else moved or max(s["rms"] for s in K["train"].values()) > PRACTICAL_K)
-    return found
 
 
 def _effect(effect: Concealed, case: ConcealedCase) -> dict[str, Any]:
@@ -168,12 +146,9 @@ def size_of(values: Array) -> dict[str, float]:
 
 
 def size_of_heat(watts: Array) -> dict[str, float]:
-    """Mean and greatest heat, and for how long it acts, rounded for the truth."""
-    active = np.abs(watts) > ACTIVE_SHARE * float(np.abs(watts).max(initial=0.0))
+    """Mean and greatest heat, rounded for the truth."""
     return {
         "mean": round(float(watts.mean()), 3),
-        "mean_active": round(float(watts[active].mean()) if active.any() else 0.0, 3),
-        "active_share": round(float(active.mean()), 4),
         "max": round(float(watts[np.abs(watts).argmax()]), 3),
     }
 
@@ -195,8 +170,8 @@ def _heat_of(effect: Concealed, k: int, with_it: Outcome, without: Outcome) -> M
     return {place: with_it.losses[place] - without.losses[place] for place in with_it.losses}
 
 
-def facts_of_heat(heat: Mapping[str, Mapping[str, Array]], rows: Mapping[str, int], row_s: float) -> dict[str, Any]:
-    """Mean and greatest heat by place, its mean magnitude over all places, and when it acted.
+def facts_of_heat(heat: Mapping[str, Mapping[str, Array]], rows: Mapping[str, int]) -> dict[str, Any]:
+    """Mean and greatest heat by place, and its mean magnitude over all places.
 
     Parameters
     ----------
@@ -206,7 +181,6 @@ def facts_of_heat(heat: Mapping[str, Mapping[str, Array]], rows: Mapping[str, in
     """
     places = dict.fromkeys(place for made in heat.values() for place in made)
     total = {name: sum(map(np.abs, made.values()), np.zeros(rows[name])) for name, made in heat.items()}
-    top = max(float(values.max(initial=0.0)) for values in total.values())
     sets = {kind: [name for name in heat if name.startswith(kind)] for kind in SETS}
     return {
         "heat_W": {
@@ -217,25 +191,7 @@ def facts_of_heat(heat: Mapping[str, Mapping[str, Array]], rows: Mapping[str, in
             kind: round(float(np.concatenate([total[name] for name in names]).mean()), 3)
             for kind, names in sets.items()
         },
-        "acting_s": {name: spans_of(values > ACTIVE_SHARE * top, row_s) for name, values in total.items()},
     }
-
-
-def spans_of(active: NDArray[np.bool_], row_s: float) -> list[list[float]]:
-    """Begin and end [s] of all stretches of rows in which something acts."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], active, [False]]).astype(int)))
-    return [[row_s * float(a), row_s * float(b)] for a, b in edges.reshape(-1, 2)]
-
-
-def _felt(with_it: Sequence[Outcome], without: Sequence[Outcome], effect: Concealed) -> dict[str, Any]:
-    """Shift of the inputs at the gearbox by an effect on an input."""
-    if effect.effect.kind != "signal":
-        return {}
-    shift = {
-        name: np.concatenate([getattr(a, name) - getattr(b, name) for a, b in zip(with_it, without, strict=True)])
-        for name in ("air", "torque")
-    }
-    return {"input_shift": {name: size_of(values) for name, values in shift.items() if np.any(values != 0.0)}}
 
 
 def facts_of_fault(changes: Mapping[str, Mapping[str, Array]], channels: Sequence[str]) -> dict[str, Any]:
@@ -248,7 +204,7 @@ def facts_of_fault(changes: Mapping[str, Mapping[str, Array]], channels: Sequenc
     shifts = {kind: {c: size_of(v) for c, v in joined(changes, kind).items() if np.any(v != 0.0)} for kind in SETS}
     nothing = {"rms": 0.0, "max": 0.0}
     K = {kind: {place: found.get(f"T_{place}_degC", nothing) for place in channels} for kind, found in shifts.items()}
-    return {"K": K, "column_shift": shifts, "heat_W": {}, "acting_s": {}}
+    return {"K": K, "column_shift": shifts, "heat_W": {}}
 
 
 def _measured(plant: Plant, case: ConcealedCase, outcomes: Sequence[Outcome], effect: Concealed) -> dict[str, Any]:

@@ -13,7 +13,6 @@ from diagnosis.proof.cases.truth import (
     facts_of_fault,
     facts_of_heat,
     facts_of_noise,
-    practical_of,
     sizes_of,
 )
 from diagnosis.proof.zoo.case import ZooCase
@@ -62,7 +61,6 @@ def truth_of(case: ZooCase, gearbox_hash: str, columns: Mapping[str, str]) -> di
         "effects": facts,
         "changed": [one for fact in facts for one in fact["changed"]],
         "visible": case.visible,
-        "practical": practical_of(facts),
         "oracle": {**_nats(case.nats), "distance_K": round(case.distance_K, 4)},
         "rejected_plants": case.rejected,
         "K_all": _kelvin(case, 0),
@@ -85,12 +83,6 @@ def truth_of(case: ZooCase, gearbox_hash: str, columns: Mapping[str, str]) -> di
             "clock_s": round(instruments.clock_s, 2),
         },
         "begins_h": {p.name: round(p.begins_h, 3) for p in case.programmes},
-        "start_degC": {
-            p.name: {
-                name: round(float(values[0, 0]), 1) for name, values in case.runs.outcomes[p.name].readings.items()
-            }
-            for p in case.programmes
-        },
     }
 
 
@@ -126,7 +118,7 @@ def _effect(case: ZooCase, k: int, columns: Mapping[str, str]) -> dict[str, Any]
     outcomes = {p.name: case.runs.outcomes[p.name] for p in case.recordings(*SETS)}
     heat = {name: _heat_of(case.plant, outcome, run, case.runs.none, changes) for name, outcome in outcomes.items()}
     rows = {name: outcome.P_loss.shape[1] for name, outcome in outcomes.items()}
-    return facts | {"K": _kelvin(case, run)} | facts_of_heat(heat, rows, case.plant.row_s)
+    return facts | {"K": _kelvin(case, run)} | facts_of_heat(heat, rows)
 
 
 def _changed(case: ZooCase, effect: ZooEffect, changed: Changed) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from diagnosis.results.predicted_run import PredictedRun
 from diagnosis.results.result import Diagnosis
 from diagnosis.results.result_parts import (
     Calibrated,
+    CalibratedModel,
     Errors,
     Finding,
     Fits,
@@ -205,11 +206,11 @@ def _diagnosis(**given: object) -> Diagnosis:
         "settings": Settings(false_alarm_rate=0.05),
         "location": (),
         "findings": (),
-        "calibration": tuple(
+        "model": CalibratedModel(calibration=tuple(
             Calibrated(parameter=p.name, prior=p.start, value=p.start + 0.08 * shift, stderr=0.05,
                        estimate=p.start + 0.1 * shift, estimate_stderr=0.06, shift_in_sd=shift)
             for p, shift in zip(PARAMETERS, SHIFTS.tolist(), strict=True)
-        ),
+        )),
         "noise_K": NOISE,
         "misfit": 0.62,
         "floor": "random heat of 0.5 % of the typical loss (140 W) in every part: assumed",

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis import Diagnosis, diagnose
+from diagnosis.diagnose_recordings import diagnose
 from diagnosis.recordings.recording import Recording
+from diagnosis.results.result import Diagnosis
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 from models.mechanisms import CATALOGUE

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from builder.workflows.known_physics import known_finding
-from diagnosis import diagnose
 from diagnosis.candidates.controls import moved_set_points
 from diagnosis.candidates.dated import Axis, changing, step
+from diagnosis.diagnose_recordings import diagnose
 from diagnosis.engine import known_switches
 from diagnosis.engine.families import candidates_of
 from diagnosis.engine.fit import Experiment, Fit, calibrate

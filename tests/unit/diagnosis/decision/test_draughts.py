@@ -75,5 +75,6 @@ def test_a_change_of_the_cooling_is_no_draught(
     weighed = [(one, infer(one, found, Settings(), rival=rival)) for one, found in reversed(scans)]
     calibration, found = most_probable(weighed)
     assert calibration is still and found.detected and found.explanations[0].names == ("air_cooling",)
-    assert found.rival_ahead == pytest.approx(ahead, abs=0.5)
-    assert alone.log_e - found.log_e == pytest.approx(found.rival_ahead, abs=0.5)  # what counts is beyond the draughts
+    assert found.assumed.draughts_ahead == pytest.approx(ahead, abs=0.5)
+    # What counts is beyond the draughts.
+    assert alone.log_e - found.log_e == pytest.approx(found.assumed.draughts_ahead, abs=0.5)

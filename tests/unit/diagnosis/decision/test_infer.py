@@ -107,12 +107,13 @@ def test_a_concealed_effect_is_detected_and_first(concealed: Posterior) -> None:
 @pytest.mark.slow
 def test_a_baseline_that_brings_evidence_raises_what_is_asked_for(fzg: Gearbox, concealed: Posterior) -> None:
     """Windage acts in the baseline alone: nothing is missing in the recordings, whatever has to be explained."""
-    assert concealed.placebo is not None and concealed.placebo.log_e_value < 10.0 == concealed.threshold
+    assert concealed.assumed.placebo is not None and concealed.assumed.placebo.log_e_value < 10.0 == concealed.threshold
     found = inferred(fzg, 0.0, in_baselines_W=(WINDAGE_W, 0.0))
-    assert found.placebo is not None
-    assert (found.placebo.session, found.placebo.mechanism, found.placebo.place) == ("april", "windage", "oil")
-    assert found.placebo.log_e_value > 10.0 and found.class_threshold == 5.0
-    assert found.threshold == found.placebo.log_e_value
+    placebo = found.assumed.placebo
+    assert placebo is not None
+    assert (placebo.session, placebo.mechanism, placebo.place) == ("april", "windage", "oil")
+    assert placebo.log_e_value > 10.0 and found.class_threshold == 5.0
+    assert found.threshold == found.assumed.placebo.log_e_value
     assert not found.detected
     judged = {one.label: one for one in found.judged if len(one.effects) == 1}
     dated, always, step = judged["windage_step@oil"], judged["windage@oil"], judged["sensor_bias_step@oil"]
@@ -128,16 +129,16 @@ def test_a_baseline_that_brings_evidence_raises_what_is_asked_for(fzg: Gearbox, 
 def test_an_effect_in_the_recordings_raises_nothing(fzg: Gearbox) -> None:
     """Beside a thermometer that reads too high in the recordings, those of the baselines would read too low."""
     found = inferred(fzg, 0.0, in_baselines_W=(0.0, 0.0), bias_K=3.0)
-    assert found.placebo is not None and found.placebo.log_e_value < 5.0
+    assert found.assumed.placebo is not None and found.assumed.placebo.log_e_value < 5.0
     assert found.detected and found.explanations[0].names == ("sensor_bias",)
     assert found.nothing.fit is not None  # the baselines repeat, so the recordings do not say otherwise
-    assert found.nothing.fit.experiment.most_deviation == rule().repeats >= found.session_s
+    assert found.nothing.fit.experiment.most_deviation == rule().repeats >= found.assumed.session_s
 
 
 @pytest.mark.slow
 def test_a_baseline_shows_nothing_of_what_has_no_place_in_the_machine(fzg: Gearbox) -> None:
     found = inferred(fzg, 0.0, switched_off=["bearing_fed_by_return"])
-    assert found.placebo is None and found.threshold == 10.0 == rule().detection * found.class_threshold
+    assert found.assumed.placebo is None and found.threshold == 10.0 == rule().detection * found.class_threshold
 
 
 def test_a_parameter_outside_its_prior_is_no_sign_that_something_is_missing() -> None:
@@ -197,18 +198,18 @@ def test_nothing_gets_the_evidence_that_it_has_from_the_point_of_an_explanation(
 
 def test_the_scan_is_told_for_a_machine_that_repeats_worse(concealed: Posterior) -> None:
     """With sessions that may differ by more, less of the difference between them is evidence."""
-    supported, worse = concealed.repeating
+    supported, worse = concealed.assumed.repeating
     assert worse.deviation_in_sd >= 2.0 * supported.deviation_in_sd and worse.deviation_in_sd > 0.0
-    assert {(one.mechanism, one.place) for one in concealed.repeating} == {("windage", "oil")}
+    assert {(one.mechanism, one.place) for one in concealed.assumed.repeating} == {("windage", "oil")}
     assert worse.log_e_value < supported.log_e_value and supported.log_e_value > 5.0
 
 
 def test_the_scan_is_told_for_less_and_more_model_error(concealed: Posterior, healthy: Posterior) -> None:
-    half, assumed, twice = concealed.scaled
+    half, assumed, twice = concealed.assumed.scaled_error
     assert (half.factor, assumed.factor, twice.factor) == (0.5, 1.0, 2.0)
-    assert {(one.mechanism, one.place) for one in concealed.scaled} == {("windage", "oil")}
-    assert all(one.log_e_value > one.threshold for one in concealed.scaled)
-    assert all(one.log_e_value < one.threshold for one in healthy.scaled)
+    assert {(one.mechanism, one.place) for one in concealed.assumed.scaled_error} == {("windage", "oil")}
+    assert all(one.log_e_value > one.threshold for one in concealed.assumed.scaled_error)
+    assert all(one.log_e_value < one.threshold for one in healthy.assumed.scaled_error)
 
 
 def test_candidates_are_judged_with_the_classes_that_are_given(fzg: Gearbox) -> None:

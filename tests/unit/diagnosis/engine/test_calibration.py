@@ -19,7 +19,7 @@ from diagnosis.engine.learnt import error_classes, widest_class
 from diagnosis.engine.model_error import ModelError
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.sessions import fit_over_sessions
-from diagnosis.forward.whitening import RandomHeat
+from diagnosis.forward.whitening import AS_ASSUMED, RandomHeat
 from models.assembly.gearbox import Gearbox
 from tests.unit.diagnosis.inference_example import recorded, with_measured
 
@@ -98,7 +98,8 @@ def shaken(fzg: Gearbox, *, times: float, lasting: float = 1.0, draught: float =
 
 def likely(experiment: Experiment) -> RandomHeat:
     fit = calibrate(experiment)
-    return NearReadings.of(experiment, ModelError.of(experiment), fit).likely_random_heat(WIDEST, fit.z)
+    near = NearReadings.of(experiment, ModelError.of(experiment), fit)
+    return near.most_probable(near.evidence_of(WIDEST, fit.z), AS_ASSUMED)
 
 
 def test_random_heats_are_as_much_as_the_readings_show(fzg: Gearbox) -> None:

@@ -11,7 +11,7 @@ import pytest
 
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.answer import Answer
-from diagnosis.decision.posterior import Expected, Judged, Placebo
+from diagnosis.decision.posterior import Assumed, Expected, Judged, Placebo
 from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.families import candidates_of
 from diagnosis.engine.fit import Experiment, Fit
@@ -48,8 +48,8 @@ def claimed(assembled: Assemble, prepared: Prepared, windage: Judged) -> Diagnos
     """Windage, 30 nat ahead of foaming oil."""
     far = judged_of(prepared, "hot_neighbour", "housing_lower", 82.0)
     placebo = Placebo(session="april", log_e_value=2.5, mechanism="windage", place="oil")
-    posterior = posterior_of(prepared[2], windage, far, session_s=0.2, error_class="no-load losses", remainder=1.5,
-                             placebo=placebo)  # fmt: skip
+    assumed = Assumed(session_s=0.2, error_class="no-load losses", placebo=placebo)
+    posterior = posterior_of(prepared[2], windage, far, assumed=assumed, remainder=1.5)
     probability = float(posterior.ranked[0][1])
     assert 0.9 < probability < 0.97
     return assembled(

@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.decision.posterior import Placebo
+from diagnosis.decision.posterior import Assumed, Placebo
 from diagnosis.decision.settings import Settings
 from diagnosis.report import finding_charts
 from diagnosis.report.page import page
 from diagnosis.results.first_screen import EITHER, VERDICT_TEXT
 from diagnosis.results.result import Diagnosis
-from diagnosis.results.result_parts import Change, Errors, Fits, Ranked, Rival, Switching
+from diagnosis.results.result_parts import CalibratedModel, Change, Errors, Fits, Ranked, Rival, Switching
 from tests.unit.diagnosis.diagnosis_example import consistent, missing_physics, two_effects, unexplained
 
 
@@ -34,7 +34,7 @@ def test_the_verdict_stands_first_then_the_questions_in_order() -> None:
 
 def test_a_baseline_that_raises_the_threshold_is_told_with_it() -> None:
     healthy = Placebo(session="march", log_e_value=38.0, mechanism="windage", place="oil")
-    raised = replace(missing_physics(), placebo=healthy, threshold=38.0)
+    raised = replace(missing_physics(), assumed=Assumed(placebo=healthy), threshold=38.0)
     assert "38.0 needed (as much as the baseline 'march' brings)" in told(raised, "Is something missing?")
     little = replace(raised, threshold=raised.further_threshold)
     assert "needed (false-alarm rate of 5 % asked for)" in told(little, "Is something missing?")
@@ -42,9 +42,10 @@ def test_a_baseline_that_raises_the_threshold_is_told_with_it() -> None:
 
 def test_evidence_against_still_air_is_told_where_draughts_are_more_probable() -> None:
     line = "Against the machine in still air it is 48.8 nat; without an effect draughts are more probable, by 7.5 nat."
-    assert line in told(replace(missing_physics(), draughts_ahead=7.5), "How sure?")
+    draughts = Assumed(draughts_ahead=7.5)
+    assert line in told(replace(missing_physics(), assumed=draughts), "How sure?")
     assert "draughts" not in told(missing_physics(), "How sure?")
-    assert "draughts" not in told(replace(consistent(), draughts_ahead=7.5), "How sure?")
+    assert "draughts" not in told(replace(consistent(), assumed=draughts), "How sure?")
 
 
 def test_a_diagnosis_of_the_loss_alone_has_a_summary() -> None:
@@ -176,7 +177,7 @@ def test_parameters_far_from_their_priors_are_told_the_farthest_first() -> None:
     seal, bearing, *rest = usual.calibration
     far = (replace(bearing, parameter="bearing", estimate=1.9, shift_in_sd=3.2),
            replace(seal, parameter="seal", estimate=0.319, shift_in_sd=-4.57))  # fmt: skip
-    sure = told(replace(usual, calibration=(*far, *rest)), "How sure?")
+    sure = told(replace(usual, model=CalibratedModel(calibration=(*far, *rest))), "How sure?")
     assert "Far from what was expected: seal = 0.319 (4.6 sd), bearing = 1.9 (3.2 sd)" in sure
 
 
