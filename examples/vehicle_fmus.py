@@ -200,8 +200,6 @@ def _build(output: Path, table: SignalTable, name: str, text: str, sources: Mapp
         description=text,
         version=version,
         author=AUTHOR,
-        license="MIT; see documentation/licenses",
-        copyright="See documentation/licenses",
         generation_tool=f"gearbox-thermal-twin {version}",
         step_size=0.1,
     )

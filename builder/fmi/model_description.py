@@ -18,6 +18,7 @@ from models.quantities.units import UNITS, conversion, find_unit
 
 DEPENDENCY_KINDS = ("constant", "tunable")
 INITIAL_DEPENDENCY_KINDS = ("constant",)  # parameters may change before the simulation starts
+STOP_TIME, TOLERANCE = 600.0, 1e-4  # of the default experiment, [s]; of the solver: .03 K at 300 K
 LOG_CATEGORIES: Mapping[str, str] = {
     "logStatusWarning": "Done, but look at it: outside the range of the networks, or a value that does not count",
     "logStatusDiscard": "A step was refused; the state is unchanged",
@@ -42,10 +43,8 @@ class FmuIdentity:
         Attributes of ``CoSimulation``
     source_files : tuple of str
         Below ``sources/``, for an FMU that can be compiled
-    stop_time, step_size : float
-        Default experiment, [s]
-    tolerance : float
-        Of the default experiment, relative: that of the solver, .03 K at 300 K
+    step_size : float
+        Of the default experiment, [s]
     """
 
     model_name: str
@@ -53,14 +52,12 @@ class FmuIdentity:
     description: str
     version: str
     author: str
-    license: str
-    copyright: str
     generation_tool: str
+    license: str = "MIT; see documentation/licenses"
+    copyright: str = "See documentation/licenses"
     flags: Mapping[str, bool | int] = field(default_factory=dict)
     source_files: tuple[str, ...] = ()
-    stop_time: float = 600.0
     step_size: float = 1.0
-    tolerance: float = 1e-4
 
 
 def model_description(table: SignalTable, identity: FmuIdentity, *, content: bytes = b"") -> bytes:
@@ -133,7 +130,7 @@ def add_log_categories(root: Element) -> None:
 
 def add_experiment(root: Element, identity: FmuIdentity) -> None:
     """The default experiment."""
-    experiment = {"stopTime": identity.stop_time, "tolerance": identity.tolerance, "stepSize": identity.step_size}
+    experiment = {"stopTime": STOP_TIME, "tolerance": TOLERANCE, "stepSize": identity.step_size}
     attributes = {name: number(value) for name, value in experiment.items()}
     SubElement(root, "DefaultExperiment", {"startTime": "0"} | attributes)
 

@@ -56,7 +56,6 @@ def common_parts(
     *,
     network: ThermalNetwork | None,
     correction: Correction | None,
-    flags: Mapping[str, bool | int],
     kind: Kind,
 ) -> CommonParts:
     """Parts of the FMU of a gearbox that do not depend on its kind.
@@ -72,8 +71,6 @@ def common_parts(
         The thermal network, if it is neither the gearbox's nominal nor the corrected one
     correction : Correction or None
         Findings of a diagnosis; the FMU contains them and its documentation lists them
-    flags : mapping of str to bool or int
-        Capabilities for the model description
     kind : Kind
         Kind of the FMU, for its documentation
 
@@ -90,7 +87,7 @@ def common_parts(
             "cannot go into an FMU; write it with arithmetic, sympy functions and sympy.Piecewise"
         )
     table = signal_table(network, losses)
-    identity = gearbox_identity(gearbox, output, flags, correction)
+    identity = gearbox_identity(gearbox, output, correction)
     reference = reference_run(gearbox, network, table, losses)
     pages = documentation(gearbox, table, identity, training, reference, kind=kind) | recorded_file(
         network, gearbox.hash
@@ -98,10 +95,8 @@ def common_parts(
     return CommonParts(network=network, losses=losses, table=table, identity=identity, pages=pages)
 
 
-def gearbox_identity(
-    gearbox: Gearbox, output: Path, flags: Mapping[str, bool | int], correction: Correction | None
-) -> FmuIdentity:
-    """Description of an FMU of a gearbox."""
+def gearbox_identity(gearbox: Gearbox, output: Path, correction: Correction | None) -> FmuIdentity:
+    """Description of an FMU of a gearbox, without its capabilities."""
     version = project_version()
     model = "thermal network" if gearbox.is_parametric else "reduced-order twin of a detailed loss model"
     subject = "Temperatures" if isinstance(gearbox.loss_laws(), NoLosses) else "Power loss and temperatures"
@@ -112,10 +107,7 @@ def gearbox_identity(
         description=f"{subject} of {gearbox.name}: {model}",
         version=version,
         author=AUTHOR,
-        license="MIT; see documentation/licenses",
-        copyright="See documentation/licenses",
         generation_tool=f"gearbox-thermal-twin {version}",
-        flags=flags,
     )
 
 

@@ -136,9 +136,7 @@ def build_native_fmu(
         If the folder cannot be written to, the network has laws that are no expressions, the networks are another
         gearbox's, or there is no compiler.
     """
-    parts = common_parts(
-        gearbox, training, output, network=network, correction=correction, flags=FLAGS[fmi], kind="native"
-    )
+    parts = common_parts(gearbox, training, output, network=network, correction=correction, kind="native")
     written = THERMAL_MODEL if parts.losses is None else THERMAL_MODEL + LOSS_NETWORKS
     return build_native_archive(
         output,

@@ -107,11 +107,11 @@ def build_python_fmu(
         If the folder cannot be written to, the network has laws that are no expressions, or the networks are another
         gearbox's.
     """
-    parts = common_parts(gearbox, training, output, network=network, correction=correction, flags=FLAGS, kind="python")
+    parts = common_parts(gearbox, training, output, network=network, correction=correction, kind="python")
     onnx = {path.name: path.read_bytes() for path in networks}
     code = python_code(parts.table, parts.network, parts.losses, onnx)
     digest = hashlib.sha256(json.dumps(code, sort_keys=True).encode()).hexdigest()
-    xml = model_description(parts.table, parts.identity, content=digest.encode())
+    xml = model_description(parts.table, replace(parts.identity, flags=FLAGS), content=digest.encode())
     identifier = parts.identity.model_identifier
     # Both names carry the digest: Python keeps one module per name in a process, so that a second FMU with modules of
     # the same name would silently run the first one's code.

@@ -14,6 +14,7 @@ from models.base.types import Array
 from models.definition.messages import place_in
 from models.formulas.oil import kinematic_viscosity_d341
 from models.network.laws import symbol
+from models.portable.evaluation import RPM
 from models.simulation.thermal_network import ThermalNetwork
 
 SHARES = (("low", 0.1), ("mid", 0.5), ("rated", 1.0))  # of the largest speed, torque and other inputs
@@ -137,7 +138,7 @@ def _heats(gearbox: Gearbox, network: ThermalNetwork) -> Grid:
     end = "[reference]" if gearbox.is_parametric else "the end of [training]"
     title = f"Losses in W, all parts at {_warm(gearbox):g} degC; rated is {end}\n({at})"
     table = _by_point(title, list(laws.components), losses)
-    power = speed * np.pi / 30.0 * torque
+    power = speed * RPM * torque
     share = [f"{100.0 * value:.3g} %" for value in losses.sum(axis=1) / power]
     return Grid(title, table.header, [*table.rows, ["share of the power", *share]])
 

@@ -198,7 +198,7 @@ class Placebo:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Assumed:
-    """What the evidence assumes beside the explanations, and what it would be with other assumptions.
+    """Assumptions that the evidence rests on, next to the explanations, and how it changes with them.
 
     Attributes
     ----------

@@ -13,6 +13,7 @@ from diagnosis.recordings.cleaning import rows_text
 from diagnosis.recordings.machine import RecordedMachine
 from diagnosis.recordings.rows import RecordedRows
 from models.base.types import Array
+from models.portable.evaluation import RPM
 from models.quantities.quantities import TOTAL_LOSS, is_total_loss
 
 HOT_AIR = 50.0  # degC on average, from which ambient air is more likely in another unit
@@ -93,7 +94,7 @@ def _colder_than_ambient(found: RecordedRows, network: RecordedMachine) -> Itera
 def _loss_and_power(found: RecordedRows) -> Iterator[str]:
     if not {TOTAL_LOSS, "speed", "torque"} <= {*found.names}:
         return
-    power = np.abs(found.values["speed"] * found.values["torque"]) * np.pi / 30.0
+    power = np.abs(found.values["speed"] * found.values["torque"]) * RPM
     loss = found.values[TOTAL_LOSS]
     both = np.isfinite(power) & np.isfinite(loss)
     if not power[both].any():

@@ -105,7 +105,7 @@ class Diagnosis:
     settings : Settings
         As asked for
     assumed : Assumed
-        What the evidence assumes of model error, sessions and draughts, and what it would be with other assumptions
+        Model error, deviation between sessions and draughts that the evidence assumes, and how it changes with them
     holdout_gain : float
         Log predictive density of the held-out readings: final model less the calibrated one, [nat]; NaN without any
     contradicted : bool

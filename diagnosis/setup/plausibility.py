@@ -7,7 +7,6 @@ refused here.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import pi
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from diagnosis.forward.trajectory import simulate
 from diagnosis.recordings.recording import Recording
 from models.base.errors import InputError
 from models.base.types import Array
+from models.portable.evaluation import RPM
 from models.quantities.quantities import TOTAL_LOSS as LOSS
 from models.simulation.thermal_network import Losses, ThermalNetwork
 
@@ -127,7 +127,7 @@ def loss_problem(loss: Array, power: Array, nominal_loss: Array) -> str:
 
 def _through(values: dict[str, Array]) -> Array:
     """Return the power through the gearbox in the intervals, shape (rows - 1,), [W]."""
-    power = np.abs(values["speed"] * pi / 30.0 * values["torque"])
+    power = np.abs(values["speed"] * RPM * values["torque"])
     return 0.5 * (power[1:] + power[:-1])
 
 

@@ -28,8 +28,9 @@ from models.formulas.oil import (
 )
 from models.losses.bearing import OIL_FLOW_HEAT, oil_flow_max
 from models.losses.loss_model import LossModel, loss_factors
-from models.losses.loss_term import MESH, OIL, RPM, SPEED_FLOOR_RPM, TORQUE_FLOOR_NM
+from models.losses.loss_term import MESH, OIL, SPEED_FLOOR_RPM, TORQUE_FLOOR_NM
 from models.network.laws import Parameter, symbol
+from models.portable.evaluation import RPM
 from models.quantities.quantities import usual_inputs
 from models.simulation.thermal_network import Link, Node, Source, ThermalNetwork
 

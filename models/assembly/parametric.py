@@ -15,9 +15,9 @@ from models.base.types import Array
 from models.definition.parametric_sections import Heat, Loss, ParametricDefinition, Path, TorqueFromPower
 from models.formulas.extremes import Max, Min
 from models.formulas.oil import T_HIGHEST, T_LOWEST, kinematic_viscosity_d341
-from models.losses.loss_term import RPM
 from models.network.expressions import parse_expression
 from models.network.laws import Parameter, compile_each, symbol
+from models.portable.evaluation import RPM
 from models.quantities.units import find_unit
 from models.simulation.thermal_network import Link, Node, Source, ThermalNetwork
 

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from models.base.errors import InputError, Problems
 from models.base.types import Array
 from models.columns.columns import Columns
+from models.files.table_file import MOST_ROWS
 from models.quantities.column_names import meant
 from models.quantities.quantities import GEARBOX_INPUTS, Input, column_of_input
 
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-MOST_ROWS = 5_000_000  # of a refined cycle, as of a table that is read
 SHORTEST_INTERVAL_S = 1e-5  # times in files have six decimals
 # Likeness of names (T_cabinet_degC is no slip of T_ambient_degC), and of names without the unit.
 NEAR, NEAR_STEM = 0.9, 0.8

@@ -11,8 +11,8 @@ from typing import Any
 import sympy as sp
 
 from models.formulas.extremes import Max, Min
+from models.quantities.units import KELVIN
 
-KELVIN = 273.15
 STEFAN_BOLTZMANN = 5.670374e-8  # W/(m^2 K^4)
 GRAVITY = 9.80665
 PRANDTL_AIR = 0.71

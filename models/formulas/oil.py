@@ -14,8 +14,8 @@ from typing import Any, Literal
 import numpy as np
 
 from models.base.types import Array, Numeric
+from models.quantities.units import KELVIN
 
-KELVIN = 273.15
 D341_CONSTANT = 0.7  # mm^2/s, ASTM D341 for nu > 2 mm^2/s; DIN 51563 prints 0.8
 P_ROELANDS = 1.96e8  # Pa
 P_GOLD = 2e8  # Pa, up to which Gold's coefficient is the mean one

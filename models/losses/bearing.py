@@ -13,8 +13,10 @@ import numpy as np
 
 from models.base.root_finding import decreasing_root
 from models.base.types import Array, Numeric
+from models.formulas.heat_transfer import GRAVITY
 from models.formulas.oil import Oil
 from models.losses.loss_term import OIL, SPEED, TORQUE, GearboxData, LossKind, LossTerm, TermInput
+from models.portable.evaluation import RPM
 
 # SKF's drag factor of roller bearings over H/d_m: read off the catalogue's diagram (digitised by the public
 # re-implementation JRaposo-m/SKF-Bearing-Selection-Tool); constant beyond 1.2.
@@ -28,7 +30,6 @@ DRAG_NU_HALF, DRAG_NU_DEEP = 500.0, 250.0
 STARVATION_NU = 500.0  # mm^2/s, up to which thicker oil is taken to starve the rolling contacts further
 OIL_FLOW_HEAT = 27.0  # W/K per l/min, SKF; rho c_p of a mineral oil at 60 degC gives 28.5
 TEMPERATURE_TOL = 5e-3  # K
-STANDARD_GRAVITY = 9.80665
 
 
 def oil_flow_max(D_mm: float, B_mm: float) -> float:
@@ -122,7 +123,7 @@ class SkfRollerBearing:
     @property
     def lightest_load(self) -> float:
         """Radial load that rests on it at least, taken as twice its own weight (15 N for an NU 406), [N]."""
-        return 2.0 * self.mass * STANDARD_GRAVITY
+        return 2.0 * self.mass * GRAVITY
 
     def friction_moments(self, *, n_rpm: Numeric, F_r: Numeric, nu: Numeric) -> tuple[Array, Array, Array]:
         """Rolling, sliding and drag moment.
@@ -210,7 +211,7 @@ class SkfRollerBearing:
 
         def power(T: Array) -> Array:
             moments = self.friction_moments(n_rpm=n_rpm, F_r=F_r, nu=oil.kinematic_viscosity(T))
-            return np.asarray(sum(moments) * n_rpm * (np.pi / 30.0) * 1e-3)
+            return np.asarray(sum(moments) * n_rpm * RPM * 1e-3)
 
         if self.temperature == "mean":
             return power(0.5 * (T_oil + T_bearing))

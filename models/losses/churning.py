@@ -10,10 +10,11 @@ import numpy as np
 
 from models.base.types import Array, Numeric
 from models.formulas.geometry import GearPair
+from models.formulas.heat_transfer import GRAVITY
 from models.formulas.oil import Oil
-from models.losses.loss_term import OIL, RPM, SPEED, GearboxData, LossKind, LossTerm, TermInput
+from models.losses.loss_term import OIL, SPEED, GearboxData, LossKind, LossTerm, TermInput
+from models.portable.evaluation import RPM
 
-GRAVITY = 9.80665
 RE_LAMINAR, RE_TURBULENT = 6000.0, 9000.0  # of 2007
 GAMMA_CALM, GAMMA_SWIRLING, RE_2011 = 750.0, 1250.0, 4000.0  # m/s^2, m/s^2, -
 

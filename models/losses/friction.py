@@ -14,7 +14,8 @@ from models.formulas import ehl
 from models.formulas.load_sharing import contact_points
 from models.formulas.oil import Oil
 from models.losses.loss_term import MESH as MESH_NODE
-from models.losses.loss_term import RPM, SPEED, TORQUE, TORQUE_FLOOR_NM, GearboxData, LossKind, LossTerm, TermInput
+from models.losses.loss_term import SPEED, TORQUE, TORQUE_FLOOR_NM, GearboxData, LossKind, LossTerm, TermInput
+from models.portable.evaluation import RPM
 
 FILM_TEMPERATURE_TOL = 5e-3  # K, residual of the film temperature
 SCHLENK_LOWEST_LOAD = 150e3  # N/m, ISO/TR 14179-2

@@ -25,7 +25,6 @@ from models.formulas.oil import Oil
 
 SPEED_FLOOR_RPM = 1.0
 TORQUE_FLOOR_NM = 1.0
-RPM = np.pi / 30.0
 OIL, MESH = "oil", "mesh"
 SPEED, TORQUE = "speed", "torque"
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from models.formulas.heat_transfer import KELVIN
 from models.mechanisms.forms import plain, positive, rises, share_between, strength, temperature
 from models.mechanisms.mechanism import Mechanism, Memory
+from models.quantities.units import KELVIN
 
 FAMILY_OUT = "heat to the surroundings"
 FAMILY_IN = "heat inside the gearbox"

@@ -98,7 +98,7 @@ def test_a_faulty_sensor_is_shown_next_to_the_truth_by_fmu_and_full_model(
         assert [name for name in result if name.endswith("_as_recorded")] == ["T_oil_degC_as_recorded"]
     mixed = SensorCorrection(channel="oil", mix=(Mix(node="frame", share=0.1),))
     nominal = Correction.of(fzg, sensors=[mixed])
-    assert "corrected" not in gearbox_identity(fzg, Path("fzg.fmu"), {}, nominal).description  # its instruments are
+    assert "corrected" not in gearbox_identity(fzg, Path("fzg.fmu"), nominal).description  # its instruments are
     write_correction(nominal, file)
     for driver in ((fzg_native,), ("--gearbox", "fzg")):
         assert run_cli("simulate", *driver, plain, "--output", out, "--correction", file) == 0

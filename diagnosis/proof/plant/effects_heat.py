@@ -10,7 +10,8 @@ from diagnosis.proof.plant.anatomy import OIL
 from diagnosis.proof.plant.effect import Draw, Effect, Grip
 from diagnosis.proof.plant.effects_losses import CHURNING, at, bearing, drawn, output_shaft, relative, share_of_loss
 from diagnosis.proof.plant.plant import REFERENCE_SPEED, Plant
-from models.formulas.heat_transfer import KELVIN, STEFAN_BOLTZMANN
+from models.formulas.heat_transfer import STEFAN_BOLTZMANN
+from models.quantities.units import KELVIN
 
 STEP_H = 10.0 / 3600.0
 

@@ -11,7 +11,7 @@ from diagnosis.proof.plant.effect import Draw, Effect, Grip, Places
 from diagnosis.proof.plant.plant import REFERENCE_SPEED, Plant
 from diagnosis.proof.plant.sizes import T_SERVICE
 from models.losses.bearing import BearingLaw
-from models.losses.loss_term import RPM
+from models.portable.evaluation import RPM
 
 TEMPERATURES, DIFFERENCES = {"T", "T_on", "T_off", "T_melt"}, {"band", "dT"}
 SLIDING, ROLLING, CHURNING = "mesh_sliding", "mesh_rolling", "churning"

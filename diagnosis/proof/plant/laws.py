@@ -10,8 +10,9 @@ from diagnosis.proof.plant.anatomy import MESH, OIL, SUMP
 from diagnosis.proof.plant.plant import Moment, Plant
 from diagnosis.proof.plant.sizes import T_SERVICE
 from models.base.types import Array
-from models.formulas.heat_transfer import KELVIN, STEFAN_BOLTZMANN
-from models.losses.loss_term import RPM
+from models.formulas.heat_transfer import STEFAN_BOLTZMANN
+from models.portable.evaluation import RPM
+from models.quantities.units import KELVIN
 
 FILM_REFERENCE_K = 316.65  # film temperature at which the reference of the convection is taken
 

@@ -11,7 +11,7 @@ from diagnosis.proof.zoo.effects import Draft, Maker, draft
 from diagnosis.proof.zoo.setting import Act, Setting, pick, soft
 from diagnosis.proof.zoo.structure import Law, Moment, constant
 from models.base.types import Array
-from models.formulas.heat_transfer import KELVIN
+from models.quantities.units import KELVIN
 
 HEAT_MAKERS: dict[str, Maker] = {}
 makes = partial(effects.makes, table=HEAT_MAKERS)

@@ -37,6 +37,20 @@ def recording_of(columns: dict[str, Array], channels: dict[str, Array]) -> Recor
     )  # fmt: skip
 
 
+def windage_ride(fzg: Gearbox, time: Array, speed: Array, torque: Array, *, windage_W: float, seed: int) -> Recording:
+    """The model itself with windage in the oil, with noise of 0.1 K and 1 % of the loss."""
+    columns = {"time_s": time, "speed_rpm": speed, "torque_Nm": torque, "T_ambient_degC": np.full(len(time), 22.0)}
+    network, scale = fzg.network(), Scale.of(fzg, speed=3300.0, torque=150.0)
+    term = next(p for p in CATALOGUE["windage"].placed(network, scale) if p.place == "oil")
+    driven = columns | {"air_speed_m_s": np.full(len(time), 2.0)}
+    made = term.apply(network, {term.strength.name: windage_W}).simulate(
+        driven, losses=fzg.losses(), initial=22.0
+    ).columns()  # fmt: skip
+    rng = np.random.default_rng(seed)
+    read = {n: made[f"T_{n}_degC"] + 0.1 * rng.standard_normal(len(time)) for n in NODES}
+    return recording_of(columns, read | {"P_loss": made["P_loss_W"] * (1.0 + 0.01 * rng.standard_normal(len(time)))})
+
+
 def recorded(
     fzg: Gearbox, name: str, *, windage_W: float = 0.0, drift_K: float = 0.0, factors: dict[str, float] | None = None,
     hours: float = 1.5,

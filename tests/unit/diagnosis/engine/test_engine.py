@@ -16,11 +16,10 @@ from diagnosis.engine.unknown import ClockOffset, InputGain, SensorBias
 from diagnosis.recordings.recording import Recording
 from diagnosis.setup.inference_setup import InferenceSetup
 from models.assembly.gearbox import Gearbox
-from models.mechanisms import CATALOGUE, Scale
+from models.mechanisms import CATALOGUE
 from models.network.laws import Parameter
-from tests.unit.diagnosis.inference_example import recording_of
+from tests.unit.diagnosis.inference_example import windage_ride
 
-NODES = ("oil", "housing_lower", "bearing_1", "pinion")
 WINDAGE_W = 60.0
 LOOKED_FOR = (
     "windage",
@@ -40,16 +39,7 @@ def recording(fzg: Gearbox) -> Recording:
     time = np.arange(0.0, 10_800.0, 10.0)
     speed = np.interp(time, [600, 660, 4000, 4060, 8000, 8060], [900, 2600, 2600, 3300, 3300, 1500])
     torque = np.interp(time, [2500, 2510, 6000, 6010], [60.0, 150.0, 150.0, 90.0])
-    columns = {"time_s": time, "speed_rpm": speed, "torque_Nm": torque, "T_ambient_degC": np.full(len(time), 22.0)}
-    network, scale = fzg.network(), Scale.of(fzg, speed=3300.0, torque=150.0)
-    term = next(p for p in CATALOGUE["windage"].placed(network, scale) if p.place == "oil")
-    driven = columns | {"air_speed_m_s": np.full(len(time), 2.0)}
-    result = term.apply(network, {term.strength.name: WINDAGE_W}).simulate(driven, losses=fzg.losses(), initial=22.0)
-    rng, made = np.random.default_rng(0), result.columns()
-    measured = {name: made[f"T_{name}_degC"] + 0.1 * rng.standard_normal(len(time)) for name in NODES}
-    return recording_of(
-        columns, measured | {"P_loss": made["P_loss_W"] * (1.0 + 0.01 * rng.standard_normal(len(time)))}
-    )
+    return windage_ride(fzg, time, speed, torque, windage_W=WINDAGE_W, seed=0)
 
 
 @pytest.fixture(scope="module")

@@ -119,6 +119,12 @@ def test_verb_writes_a_case_and_keeps_another(tmp_path: Path) -> None:
         ("--effect windage --random", "either --effect NAME or --random"),
         ("--random --strength 1", "--strength goes with --effect"),
         ("--random --truth OUT/recordings/t", "must not lie among the recordings"),
+        ("--plant zoo --group singl", "did you mean 'single'"),
+        ("--plant zoo --families wals", "did you mean 'walls'"),
+        ("--plant zoo --effect windage", "--effect: do not go with --plant zoo"),
+        ("--effect windage --baselines 1", "--baselines: go with --plant zoo only"),
+        ("--effect windage --group single", "--group: go with --plant zoo only"),
+        ("--plant zoo --truth OUT/recordings/t", "must not lie among the recordings"),
     ],
 )
 def test_verb_refuses(arguments: str, message: str, tmp_path: Path) -> None:

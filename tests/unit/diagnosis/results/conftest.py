@@ -21,11 +21,8 @@ from diagnosis.recordings.recording import Recording
 from diagnosis.results.assemble import assemble
 from diagnosis.results.result import Diagnosis
 from models.assembly.gearbox import Gearbox
-from models.mechanisms import CATALOGUE, Scale
-from tests.unit.diagnosis.inference_example import recording_of
-from tests.unit.diagnosis.results.assembled_example import NOISE_K, WINDAGE_W, Assemble, Prepared, effect_of
-
-NODES = ("oil", "housing_lower", "bearing_1", "pinion")
+from tests.unit.diagnosis.inference_example import windage_ride
+from tests.unit.diagnosis.results.assembled_example import WINDAGE_W, Assemble, Prepared, effect_of
 
 
 @pytest.fixture(scope="session")
@@ -36,17 +33,7 @@ def recordings(fzg: Gearbox) -> tuple[Recording, Recording]:
         time = np.arange(0.0, 7200.0, 10.0)
         speed = np.interp(time, [600, 660, 3600, 3660], [900, levels[0], levels[0], levels[1]])
         torque = np.interp(time, [2400, 2410, 5400, 5410], [60.0, 150.0, 150.0, 90.0])
-        columns = {"time_s": time, "speed_rpm": speed, "torque_Nm": torque, "T_ambient_degC": np.full(len(time), 22.0)}
-        network, scale = fzg.network(), Scale.of(fzg, speed=3300.0, torque=150.0)
-        term = next(p for p in CATALOGUE["windage"].placed(network, scale) if p.place == "oil")
-        driven = columns | {"air_speed_m_s": np.full(len(time), 2.0)}
-        made = term.apply(network, {term.strength.name: WINDAGE_W}).simulate(
-            driven, losses=fzg.losses(), initial=22.0
-        ).columns()  # fmt: skip
-        rng = np.random.default_rng(seed)
-        read = {n: made[f"T_{n}_degC"] + NOISE_K * rng.standard_normal(len(time)) for n in NODES}
-        loss = made["P_loss_W"] * (1.0 + 0.01 * rng.standard_normal(len(time)))
-        return recording_of(columns, read | {"P_loss": loss})
+        return windage_ride(fzg, time, speed, torque, windage_W=WINDAGE_W, seed=seed)
 
     learnt = replace(ride((2600.0, 3300.0), 0), start=datetime(2020, 1, 1, 8, tzinfo=UTC))
     return learnt, replace(ride((3300.0, 1500.0), 1), name="judged")

@@ -14,19 +14,8 @@ import pytest
 from models.assembly.gearbox import Gearbox, known_gearboxes, load_gearbox, read_gearbox
 from models.base.errors import InputError
 from models.definition.named_oils import named_oil
-from models.files.toml_file import packaged, read_text
 from models.quantities.definition_units import UNITS, unit_of
-
-FZG = read_text(packaged("gearboxes", "fzg"))
-
-
-def edited(*changes: tuple[str, str]) -> str:
-    """Return the FZG file with texts exchanged (their first occurrence)."""
-    text = FZG
-    for old, new in changes:
-        assert old in text, f"the FZG file has no {old!r}"
-        text = text.replace(old, new, 1)
-    return text
+from tests.unit.models.fzg_file import FZG, edited
 
 
 @pytest.fixture(scope="module")

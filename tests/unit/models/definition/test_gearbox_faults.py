@@ -11,19 +11,9 @@ from hypothesis import strategies as st
 
 from models.assembly.gearbox import load_gearbox, read_gearbox
 from models.base.errors import InputError
-from models.files.toml_file import packaged, read_text
+from tests.unit.models.fzg_file import FZG, edited
 
-FZG = read_text(packaged("gearboxes", "fzg"))
 THIRD_SHAFT = '[[shaft]]\nname = "shaft_3"\nlength_mm = 90.0\ndiameter_mm = 20.0\n[[bearing]]'
-
-
-def edited(*changes: tuple[str, str]) -> str:
-    """Return the FZG file with texts exchanged (their first occurrence)."""
-    text = FZG
-    for old, new in changes:
-        assert old in text, f"the FZG file has no {old!r}"
-        text = text.replace(old, new, 1)
-    return text
 
 
 def message_about(text: str) -> str:

@@ -10,9 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
-from builder.commands.conceal import conceal
 from diagnosis.proof.cases.time_course import ALWAYS, Course
 from diagnosis.proof.plant import cycles
 from diagnosis.proof.zoo import draw
@@ -223,20 +221,3 @@ def test_a_folder_that_cannot_be_written_is_named(drawn: Drawn, fzg: Gearbox, tm
     (tmp_path / "case").write_text("a file, no folder")
     with pytest.raises(InputError, match="case: cannot be written"):
         write_zoo_case(case_of(drawn, fzg, "control"), tmp_path / "case", None)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ("--plant zoo --group singl", "did you mean 'single'"),
-        ("--plant zoo --families wals", "did you mean 'walls'"),
-        ("--plant zoo --effect windage", "--effect: do not go with --plant zoo"),
-        ("--effect windage --baselines 1", "--baselines: go with --plant zoo only"),
-        ("--effect windage --group single", "--group: go with --plant zoo only"),
-        ("--plant zoo --truth OUT/recordings/t", "must not lie among the recordings"),
-    ],
-)
-def test_verb_refuses(arguments: str, message: str, tmp_path: Path) -> None:
-    words = f"{arguments} --seed 1 --output OUT".replace("OUT", str(tmp_path)).split()
-    assert message in str(CliRunner().invoke(conceal, words).exception)
-    assert not list(tmp_path.iterdir())
