@@ -8,9 +8,9 @@ from pathlib import Path
 import click
 
 from builder.base import console
-from builder.base.example import example
+from builder.base.options import example, gearbox_option
 from builder.base.progress import LOADING, progress
-from models.assembly.gearbox import known_gearboxes, load_gearbox
+from models.assembly.gearbox import load_gearbox
 from models.base.errors import InputError
 from models.correction.correction import Correction, read_correction, write_correction
 from models.files.toml_file import ENDING
@@ -19,8 +19,7 @@ from models.files.toml_file import ENDING
 @click.command("add", epilog=example("add known.toml fan_thermostat --set strength=7 --set set_point=55:2"))
 @click.argument("file", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE")
 @click.argument("mechanism", metavar="MECHANISM")
-@click.option("--gearbox", default="fzg", show_default=True, metavar="NAME|FILE",
-              help=f"Name ({', '.join(known_gearboxes())}) or definition file (TOML).")  # fmt: skip
+@gearbox_option()
 @click.option("--place", default=None, metavar="NAME", help="Where it is.  [default: its only place]")
 @click.option("--set", "given", multiple=True, metavar="NAME=VALUE[:ERROR]",
               help="A number of it, with its standard error; without one it is exact. Numbers that are not given are "

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from builder.base import console
-from builder.base.example import example
+from builder.base.options import example
 from builder.base.progress import LOADING, progress
 from models.assembly.gearbox import known_gearboxes, load_gearbox
 from models.base.atomic_write import atomic_file

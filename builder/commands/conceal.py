@@ -9,8 +9,7 @@ from pathlib import Path
 import click
 
 from builder.base import console
-from builder.base.example import example
-from builder.base.finite_range import FiniteRange
+from builder.base.options import FiniteRange, example
 from builder.base.progress import LOADING, progress
 from models.assembly.gearbox import load_gearbox
 from models.base.errors import InputError

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from builder.base import console
-from builder.base.example import example
+from builder.base.options import example
 from models.assembly.commented_definition import commented_definition
 from models.assembly.definition_schema import definition_schema
 from models.assembly.gearbox import known_gearboxes, load_gearbox

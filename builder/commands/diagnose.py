@@ -10,11 +10,9 @@ import click
 from click.core import ParameterSource
 
 from builder.base import console
-from builder.base.decision_settings import settings_options
-from builder.base.example import example
+from builder.base.options import example, gearbox_option, settings_options, worker_options
 from builder.base.progress import LOADING, progress
-from builder.base.workers import worker_options
-from models.assembly.gearbox import known_gearboxes, load_gearbox
+from models.assembly.gearbox import load_gearbox
 from models.base.errors import InputError, did_you_mean
 from models.correction.correction import Correction, read_correction
 
@@ -58,8 +56,7 @@ class _OptionsOfMany(click.Command):
     epilog=example("diagnose examples/data/heated_rod.csv.gz@0..28800 --gearbox heated_rod"),
 )
 @click.argument("recordings", nargs=-1, required=True, metavar="RECORDING... [OPTIONS]")
-@click.option("--gearbox", default="fzg", show_default=True, metavar="NAME|FILE",
-              help=f"Name ({', '.join(known_gearboxes())}) or definition file (TOML).")  # fmt: skip
+@gearbox_option()
 @click.option("--holdout", multiple=True, metavar="RECORDING...",
               help="To judge by: all up to the next option.  [default: the last quarter of each]")  # fmt: skip
 @click.option("--baseline", multiple=True, metavar="RECORDING...",

@@ -11,9 +11,8 @@ import click
 from click.core import ParameterSource
 
 from builder.base import console
-from builder.base.example import example
+from builder.base.options import example, gearbox_option, jobs_option
 from builder.base.progress import LOADING, progress
-from builder.base.workers import jobs_option
 from models.assembly.gearbox import load_gearbox
 from models.base.errors import InputError
 
@@ -110,9 +109,7 @@ def prove(
 @click.argument("results", type=click.Path(path_type=Path, file_okay=False, exists=True), metavar="RESULTS")
 @click.option("--truth", type=click.Path(path_type=Path, exists=True), required=True, metavar="FILE|DIR",
               help="Truth: one file, or <case>.json in a folder.")  # fmt: skip
-@click.option(
-    "--gearbox", default="fzg", show_default=True, metavar="NAME|FILE", help="Name or definition file (TOML)."
-)
+@gearbox_option()
 @click.option("--output", type=click.Path(path_type=Path, file_okay=False), default=Path("out/score"),
               show_default=True, metavar="DIR", help="Folder for the scores.")  # fmt: skip
 def score(results: Path, truth: Path, gearbox: str, output: Path) -> None:

@@ -14,13 +14,13 @@ import click
 import numpy as np
 
 from builder.base import console
-from builder.base.example import example
+from builder.base.options import GEARBOX_HELP, CorrectionFile, correction_options, example, gearbox_option
 from builder.base.progress import progress
-from models.assembly.gearbox import known_gearboxes, load_gearbox
+from models.assembly.gearbox import load_gearbox
 from models.base.atomic_write import atomic_file
 from models.base.errors import InputError
 from models.base.types import Array
-from models.correction.correction import Correction, parse_correction, read_correction
+from models.correction.correction import Correction
 from models.definition.sections import Training
 from models.files.cycle import Cycle
 from models.files.output_files import refuse_to_replace, write_table
@@ -72,12 +72,11 @@ class Model:
     memories: Mapping[str, float] = field(default_factory=dict)
 
 
-def _full_model(name_or_file: str, correction: Path | None, *, claims_only: bool) -> Model:
+def _full_model(name_or_file: str, correction: CorrectionFile | None) -> Model:
     gearbox = load_gearbox(name_or_file)
     network, found = gearbox.network(), None
     if correction is not None:
-        found = read_correction(correction, gearbox)
-        found = found.claims_only() if claims_only else found
+        found = correction.read(gearbox)
         network = found.network(gearbox)
     trained = None if gearbox.is_parametric else gearbox.training
 
@@ -104,19 +103,18 @@ def _range_of(trained: Training) -> str:
     )
 
 
-def _fmu(path: Path, correction: Path | None, *, claims_only: bool) -> Model:
+def _fmu(path: Path, correction: CorrectionFile | None) -> Model:
     from builder.drive.driver import drive_fmu  # imports fmpy; the full model need not wait for it
     from builder.drive.machine_of_fmu import fmu_machine, fmu_memories, fmu_nodes, refuse_other_correction
 
     machine, found = fmu_machine(path), None
     if correction is not None:
-        found = parse_correction(correction)
-        found = found.claims_only() if claims_only else found
-        refuse_other_correction(path, found, source=str(correction))
+        found = correction.parse()
+        refuse_other_correction(path, found, source=str(correction.path))
         try:
             found.check_instruments(fmu_nodes(path), machine.inputs)
         except InputError as error:
-            raise InputError("\n".join(f"{correction}: {line}" for line in str(error).splitlines())) from error
+            raise InputError("\n".join(f"{correction.path}: {line}" for line in str(error).splitlines())) from error
 
     def run(cycle: Cycle, initial: Initial, told: Count) -> dict[str, Array]:
         return drive_fmu(path, cycle, initial=initial, progress=told)
@@ -158,9 +156,7 @@ def _simulated(model: Model, cycle: Cycle, start: Initial, *, is_recording: bool
 
 @click.command("simulate", epilog=example("simulate --gearbox fzg examples/drive_cycle_600s.csv --output result.csv"))
 @click.argument("files", nargs=-1, required=True, metavar="[FMU] CYCLE", type=click.Path(path_type=Path))
-@click.option("--gearbox", default=None, metavar="NAME|FILE",
-              help="Drive the full model instead. "
-                   f"Name ({', '.join(known_gearboxes())}) or definition file (TOML).")  # fmt: skip
+@gearbox_option(f"Drive the full model instead. {GEARBOX_HELP}", default=None)
 @click.option("--output", required=True, type=click.Path(path_type=Path), metavar="FILE",
               help="Result: .csv, .csv.gz or .parquet.")  # fmt: skip
 @click.option("--output-interval", type=float, default=None, metavar="S",
@@ -173,12 +169,10 @@ def _simulated(model: Model, cycle: Cycle, start: Initial, *, is_recording: bool
 @click.option("--mapping", type=click.Path(path_type=Path, dir_okay=False), default=None, metavar="FILE",
               help="What the columns of a recording mean.  [default: <stem>.toml or mapping.toml next to it, else as "
                    "the definition states]")  # fmt: skip
-@click.option("--correction", type=click.Path(path_type=Path, dir_okay=False), default=None,
-              metavar="FILE", help="Result of diagnose: the full model carries it, an FMU was built with it. A "
-                                   "recording (with measured temperatures) drives the model with its inputs as they "
-                                   "probably were; <column>_as_recorded are those that it has, and the readings of the "
-                                   "sensors of the correction, to compare with it.")  # fmt: skip
-@click.option("--claims-only", is_flag=True, help="Of --correction without what is only likely.")
+@correction_options("Result of diagnose: the full model carries it, an FMU was built with it. A recording (with "
+                    "measured temperatures) drives the model with its inputs as they probably were; "
+                    "<column>_as_recorded are those that it has, and the readings of the sensors of the correction, to "
+                    "compare with it.")  # fmt: skip
 @click.option("--plot", type=click.Path(path_type=Path), default=None, metavar="FILE", help="Plot: .png, .pdf or .svg.")
 def simulate(
     files: tuple[Path, ...],
@@ -187,8 +181,7 @@ def simulate(
     output_interval: float | None,
     initial: str | None,
     mapping: Path | None,
-    correction: Path | None,
-    claims_only: bool,
+    correction: CorrectionFile | None,
     plot: Path | None,
 ) -> None:
     """Drive a cycle with an FMU or with the full model.
@@ -198,15 +191,18 @@ def simulate(
     a recording that diagnose reads as well, or a part of one (FILE@FROM..TO), or files that follow each other in
     time (FILE+FILE).
     """
-    _check_usage(files, gearbox, correction, claims_only=claims_only)
-    named = [Path(name) for name in (gearbox, initial, mapping, correction) if name is not None]
+    named = [
+        Path(name)
+        for name in (gearbox, initial, mapping, None if correction is None else correction.path)
+        if name is not None
+    ]
     _check_outputs(output, plot, inputs=[*_read_as_files(files, gearbox), *named])
     from diagnosis.recordings.as_cycle import read_cycle_or_recording
     from models.files.cycle_file import read_initial
 
     given = None if initial in (None, RECORDED) else read_initial(str(initial))
     model_of = partial(_fmu, files[0]) if gearbox is None else partial(_full_model, gearbox)
-    model = model_of(correction, claims_only=claims_only)
+    model = model_of(correction)
     inputs, nodes = model.machine.inputs, tuple(part.name for part in model.machine.parts)
     cycle, recorded, notes = read_cycle_or_recording(files[-1], model.machine, mapping=mapping)
     for note in notes:
@@ -246,16 +242,11 @@ def simulate(
 
 def _read_as_files(files: tuple[Path, ...], gearbox: str | None) -> tuple[Path, ...]:
     """Return the files that are read; a part of a recording counts as its file."""
+    if len(files) > 2 or (len(files) == 2) == (gearbox is not None):
+        raise InputError("simulate takes FMU CYCLE, or --gearbox NAME|FILE and CYCLE")
     from diagnosis.recordings.time_axis import split_path
 
     return (*(files[:-1] if gearbox is None else ()), *split_path(files[-1])[0])
-
-
-def _check_usage(files: tuple[Path, ...], gearbox: str | None, correction: Path | None, *, claims_only: bool) -> None:
-    if len(files) > 2 or (len(files) == 2) == (gearbox is not None):
-        raise InputError("simulate takes FMU CYCLE, or --gearbox NAME|FILE and CYCLE")
-    if claims_only and correction is None:
-        raise InputError("--claims-only is about --correction; give both")
 
 
 def _check_outputs(output: Path, plot: Path | None, inputs: list[Path]) -> None:

@@ -8,9 +8,8 @@ from pathlib import Path
 import click
 
 from builder.base import console
-from builder.base.example import example
+from builder.base.options import example, jobs_option
 from builder.base.progress import LOADING, progress
-from builder.base.workers import jobs_option
 
 
 @click.command("reproduce", epilog=example("reproduce --output out/paper"))

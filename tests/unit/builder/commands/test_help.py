@@ -9,7 +9,7 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from builder.base.example import PROGRAM
+from builder.base.options import PROGRAM
 from builder.commands.cli import GROUPS, commands
 
 LINES, WIDTH = 23, 80  # of a terminal, less the line of the prompt
