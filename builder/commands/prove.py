@@ -141,7 +141,7 @@ def _settings_of_made(
     cells_every: int, baselines: int, removed: bool,
 ) -> Settings:  # fmt: skip
     """Settings of a proof with cases that are made; refuses what does not fit the kind of plant."""
-    from builder.workflows.proof_cases import ZOO_MIX
+    from builder.workflows.proof_cases import ZOO_COUNTS
     from diagnosis.proof.cases.conceal import PROOF_MIX, mix_of
     from diagnosis.proof.scoring.lines import Settings
     from diagnosis.proof.scoring.seeds import OWN_PROOF, ZOO_PROOF
@@ -152,7 +152,7 @@ def _settings_of_made(
         raise InputError("--removed is for --plant own; the zoo has effects outside the catalogue")
     if plant == "own" and baselines:
         raise InputError("--baselines is for --plant zoo and --recordings; the own plant records no baselines")
-    mix, chosen, machine = (PROOF_MIX, OWN_PROOF, "fzg") if plant == "own" else (ZOO_MIX, ZOO_PROOF[0], "")
+    mix, chosen, machine = (PROOF_MIX, OWN_PROOF, "fzg") if plant == "own" else (ZOO_COUNTS, ZOO_PROOF[0], "")
     number = sum(mix_of(cases or sum(mix.values()), mix).values())  # refuses too few
     return Settings(plant=plant, seed=chosen if seed is None else seed, cases=number, gearbox=gearbox or machine,
                     families=families, cells_every=cells_every, baselines=baselines, removed=removed)  # fmt: skip

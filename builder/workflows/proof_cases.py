@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from diagnosis.proof.zoo.case import ZooPlan
 
 # Of a proof on plants of the zoo.
-ZOO_MIX = {"control": 20, "single": 13, "date": 9, "sensor": 6, "pair": 5, "outside": 5, "messy": 2}
+ZOO_COUNTS = {"control": 20, "single": 13, "date": 9, "sensor": 6, "pair": 5, "outside": 5, "messy": 2}
 
 ZOO_BASELINES = 2  # that every case of the zoo has, whether or not its diagnosis gets them
 
@@ -59,7 +59,7 @@ def make_cases(settings: Settings, recordings: Path, truth: Path, jobs: int, pro
         from diagnosis.proof.zoo.conceal_zoo import zoo_plans
 
         families = settings.families.split(",") if settings.families else None
-        drawn = zoo_plans(settings.seed, mix_of(settings.cases, ZOO_MIX), families=families,
+        drawn = zoo_plans(settings.seed, mix_of(settings.cases, ZOO_COUNTS), families=families,
                           machine=settings.gearbox or None)  # fmt: skip
         plans = dict(zip(names, drawn, strict=True))
         baselines = max(ZOO_BASELINES, settings.baselines)

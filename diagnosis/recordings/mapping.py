@@ -58,7 +58,7 @@ CLOCK_TIME = "hh:mm:ss"  # unit of times since the start, or of day, as 13:05:00
 TIME_UNITS = ("s", "ms", "us", "ns", "min", "h", "d", "iso8601", CLOCK_TIME)
 AUXILIARY, IGNORE = "auxiliary", "ignore"  # roles of columns that are no quantity
 SCALED = ("torque", TOTAL_LOSS)  # quantities whose scale is calibrated
-KELVIN = (200.0, 600.0)  # no gearbox has such temperatures in degC all the time
+KELVIN_RANGE = (200.0, 600.0)  # no gearbox has such temperatures in degC all the time
 
 
 class Column(Section):
@@ -259,7 +259,7 @@ def looks_like_kelvin(quantity: Quantity, lowest: float, highest: float) -> bool
     >>> looks_like_kelvin(quantity_of("T_oil"), 293.0, 361.0), looks_like_kelvin(quantity_of("T_oil"), 20.0, 90.0)
     (True, False)
     """
-    return quantity.is_temperature and quantity.unit == "degC" and KELVIN[0] < lowest <= highest < KELVIN[1]
+    return quantity.is_temperature and quantity.unit == "degC" and KELVIN_RANGE[0] < lowest <= highest < KELVIN_RANGE[1]
 
 
 def _constant_faults(name: str, value: float) -> Iterator[str]:

@@ -133,7 +133,7 @@ def test_a_proof_of_the_zoo_is_continued_while_its_cases_are_made(
     with pytest.raises(KeyboardInterrupt):
         prove(tmp_path / "35.jsonl", output)
     result = prove(tmp_path / "35.jsonl", output)
-    assert result["cases"]["all"] == 7 and {row["group"] for row in result["lines"]} == set(proof_cases.ZOO_MIX)
+    assert result["cases"]["all"] == 7 and {row["group"] for row in result["lines"]} == set(proof_cases.ZOO_COUNTS)
     assert all(name.startswith("zoo: ") for name in result["cases"] if name != "all")
 
 

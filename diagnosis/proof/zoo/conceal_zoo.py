@@ -20,7 +20,7 @@ from models.base.types import Array
 from models.files.toml_file import names_a_file, packaged, read_text
 
 # Shares of a set in which nothing else is asked for.
-ZOO_MIX = {"control": 0.3, "single": 0.2, "date": 0.15, "sensor": 0.1, "pair": 0.1, "outside": 0.1, "messy": 0.05}
+ZOO_SHARES = {"control": 0.3, "single": 0.2, "date": 0.15, "sensor": 0.1, "pair": 0.1, "outside": 0.1, "messy": 0.05}
 
 
 def zoo_plans(
@@ -71,8 +71,8 @@ def zoo_plans(
 def random_zoo_plans(
     seed: int, number: int, *, families: Sequence[str] | None = None, machine: str | None = None
 ) -> list[ZooPlan]:
-    """Plans drawn in the proportions of :data:`ZOO_MIX`."""
-    return zoo_plans(seed, drawn_counts(seed, number, ZOO_MIX), families=families, machine=machine)
+    """Plans drawn in the proportions of :data:`ZOO_SHARES`."""
+    return zoo_plans(seed, drawn_counts(seed, number, ZOO_SHARES), families=families, machine=machine)
 
 
 def conceal_zoo(
