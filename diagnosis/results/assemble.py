@@ -10,38 +10,31 @@ from typing import Any
 import numpy as np
 
 from diagnosis.candidates.hypotheses import Hypothesis
-from diagnosis.decision.answer import Answer, act_on_the_same, decide, withdraw_claim
+from diagnosis.decision.answer import Answer, act_on_the_same
 from diagnosis.decision.posterior import KINDS, Expected, Judged, Posterior
 from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.fit import Experiment, Fit
-from diagnosis.engine.predict import overall_rmse, rmse
-from diagnosis.engine.prepare import held_out_experiment
 from diagnosis.engine.scale import at_stated_size
-from diagnosis.engine.set_apart import refit_to_predict
 from diagnosis.forward.grid import too_short
 from diagnosis.forward.whitening import RandomHeat
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.advice import next_test
 from diagnosis.results.findings import estimates_of, finding_of, joint_estimate_of, switch_errors
+from diagnosis.results.held_out import confront
 from diagnosis.results.instruments import sensors_and_inputs_of
 from diagnosis.results.locations import locations_of
 from diagnosis.results.notes import baseline_notes, limit_notes, ratio_notes
 from diagnosis.results.predicted_run import PredictedRun
-from diagnosis.results.predictions import Predicted, Predictions, predict_recordings, temperatures
+from diagnosis.results.predictions import Predicted
 from diagnosis.results.result import Diagnosis, Verdict
 from diagnosis.results.result_parts import (
-    MODELS,
     NO_CLAIM,
     Calibrated,
     CalibratedModel,
-    Errors,
     Finding,
-    Fits,
     NotDetectable,
     Ranked,
-    Refuted,
     called,
-    named,
     spoiled_in,
 )
 from diagnosis.setup.inference_setup import InferenceSetup
@@ -99,70 +92,26 @@ def assemble(
     others : Others or None
         What all but faulty channels say, if there are any
     """
-    settings, known = posterior.settings, setup.known
     faulty = () if others is None else others.channels
-    counting = [name for name in setup.channels if name not in faulty]
-
-    draught = calibration.near.experiment.random_heat.draught
-    held_out = held_out_experiment(setup, experiment).with_random_heat(RandomHeat(draught=draught))
-
-    def judged_by(best: Judged | None) -> tuple[Predicted, Fits, bool]:
-        """Predictions by an explanation, and whether the held-out recordings contradict it."""
-        predicted = predict_recordings(
-            experiment, held_out, plain=plain,
-            found=_final(best, plain, faulty),
-            explanation=None if faulty else best or posterior.nothing, near=calibration.near, counting=counting,
-            noise_K=setup.noise_K,
-        )  # fmt: skip
-        holdout = _fits(setup, predicted.holdout, counting)
-        gain = predicted.holdout_gain
-        against = holdout.contradict(gain, setup.noise_K, posterior.class_threshold)
-        if best is not None and best.error_class.is_large and all(one.how == "always" for one in best.effects):
-            against |= gain < posterior.rule.confirmed
-        return predicted, holdout, against and bool(answers) and not faulty
-
-    best = _best(posterior, answers)
-    predicted, holdout, contradicted = judged_by(best)
-    single, much, left_out = _named_alone(posterior, answers) if contradicted else None, False, ""
-    if single is not None and not (alone := judged_by(single))[-1]:  # what has no name does the harm
-        best, (predicted, holdout, contradicted) = single, alone
-        answers = [replace(answer, best=single) for answer in answers]
-        much, left_out = posterior.leaves_much(single), LEFT_OUT
-    refuted = None
-    both = posterior.log_e + predicted.holdout_gain
-    if best is not None and posterior.detected and both < posterior.threshold and not faulty:
-        names = " and ".join(named(effect.mechanism, effect.place) for effect in best.effects)
-        refuted = Refuted(names=names, log_e_value=posterior.log_e, log_score_gain=predicted.holdout_gain)
-        posterior = replace(posterior, log_e=both)
-        answers, much, left_out = decide(posterior), False, ""
-        best = _best(posterior, answers)
-        predicted, holdout, contradicted = judged_by(best)
-    gain, in_model, train_fits = predicted.holdout_gain, best, _fits(setup, predicted.train, counting)
-    if contradicted and holdout.after > holdout.calibrated:  # what does not improve the prediction is not in the model
-        in_model, with_it = None, (train_fits, holdout)
-        predicted, holdout, _ = judged_by(None)
-        train_fits, holdout = (
-            replace(fits, found=known.found)
-            for fits, known in zip((_fits(setup, predicted.train, counting), holdout), with_it, strict=True)
-        )
-    final = predicted.final
-    if contradicted or much:
-        answers = [withdraw_claim(answer, posterior.rule) for answer in answers]
+    tried = confront(setup, experiment, posterior, answers, plain=plain, calibration=calibration, faulty=faulty)
+    posterior, best, final = tried.posterior, tried.best, tried.model.predicted.final
+    train, holdout = tried.model.train, tried.model.holdout
+    settings, known = posterior.settings, setup.known
     reported = _distinct([
         (answer, finding_of(answer, answer.best.fit or final, setup, posterior))
-        for answer in answers
+        for answer in tried.answers
     ])  # fmt: skip
     findings = tuple(finding for _, finding in reported)
     unseen = _unseen(setup, posterior, findings)
-    spoiled = spoiled_in(train_fits, holdout, baselines=[r.name for r in setup.baseline],
+    spoiled = spoiled_in(train, holdout, baselines=[r.name for r in setup.baseline],
                          least_K=settings.matters_K + setup.noise_K)  # fmt: skip
-    unfit = bool(spoiled) or train_fits.calibrated - train_fits.before > setup.noise_K
+    unfit = bool(spoiled) or train.calibrated - train.before > setup.noise_K
     verdict = verdict_of(posterior, [answer for answer, _ in reported], unseen, unfit=unfit)
     location = locations_of(setup, posterior) if posterior.detected or verdict in NO_CLAIM else ()
     inputs = setup.gearbox.network().inputs
-    most_probable = in_model if others is None else others.posterior.nothing
+    most_probable = tried.model.best if others is None else others.posterior.nothing
     believed = (most_probable.fit if most_probable else None) or calibration.fit
-    model = _calibrated(final, believed, plain, inputs, in_model.effects if in_model else ())
+    model = _calibrated(final, believed, plain, inputs, tried.model.best.effects if tried.model.best else ())
     return Diagnosis(
         verdict=verdict,
         gearbox=setup.gearbox.name,
@@ -172,10 +121,10 @@ def assemble(
         location=location,
         findings=findings,
         model=model,
-        train=train_fits,
+        train=train,
         holdout=holdout,
         faulty=faulty,
-        terms=_terms(in_model, final),
+        terms=_terms(tried.model.best, final),
         known=known,
         alone=_calibrated(plain, calibration.fit, plain, inputs),
         joint=joint_estimate_of(final),
@@ -184,7 +133,7 @@ def assemble(
         floor=_floor(setup, calibration.near.experiment.random_heat),
         misfit=_misfit(final),
         remaining_nat=0.0 if _looked_no_further(best) else posterior.left_by(best),
-        remaining_note=_remaining(posterior, others, best) + left_out,
+        remaining_note=_remaining(posterior, others, best) + (LEFT_OUT if tried.without_second else ""),
         ranking=_ranking(posterior),
         unseen=unseen,
         not_tried=tuple(sorted(
@@ -193,24 +142,24 @@ def assemble(
         )),
         next_test=next_test(
             setup, verdict, findings, location if posterior.detected else (), unseen,
-            calibration=model.calibration, missed=holdout.far_beyond(train_fits, settings.matters_K),
+            calibration=model.calibration, missed=holdout.far_beyond(train, settings.matters_K),
         ),
-        courses=_courses(setup, predicted),
+        courses=_courses(setup, tried.model.predicted),
         network=setup.nominal,
         shapes=setup.shapes,
-        learnt=predicted.learnt,
-        left_out_K=predicted.left_out_K,
+        learnt=tried.model.predicted.learnt,
+        left_out_K=tried.model.predicted.left_out_K,
         inputs=_provenance(setup),
         notes=(
-            *ratio_notes(final), *limit_notes(final), *baseline_notes(experiment, posterior, answers),
+            *ratio_notes(final), *limit_notes(final), *baseline_notes(experiment, posterior, tried.answers),
             *_notes_of_recordings(setup),
         ),
         kinds={kind: posterior.of(kind) for kind in KINDS},
         settings=settings,
         assumed=posterior.assumed,
-        holdout_gain=gain,
-        contradicted=contradicted,
-        refuted=refuted,
+        holdout_gain=tried.log_score_gain,
+        contradicted=tried.contradicted,
+        refuted=tried.refuted,
         spoiled=spoiled,
     )  # fmt: skip
 
@@ -248,34 +197,6 @@ def faulty_channels(posterior: Posterior, apart: Sequence[str]) -> tuple[str, ..
                if any(e.term is not None and e.term.kind == "sensor" and channel in e.term.target for e in one.effects)
                ) > PROBABLY
     )  # fmt: skip
-
-
-def _best(posterior: Posterior, answers: Sequence[Answer]) -> Judged | None:
-    """The explanation that predicts: of the answers, else the most probable one, which needs no name for that."""
-    if answers:
-        return answers[0].best
-    fitted = (one for one, _ in posterior.ranked if one.fit is not None and one.kind != "nothing")
-    return next(fitted, None) if posterior.detected else None
-
-
-def _named_alone(posterior: Posterior, answers: Sequence[Answer]) -> Judged | None:
-    """The effect with a name without the one next to it, fitted; None if both have names, or there is one effect."""
-    if len(answers) != 1 or len(answers[0].best.effects) == 1:
-        return None
-    label = answers[0].effect.label
-    singles = (one for one in posterior.judged if len(one.effects) == 1 and one.fit is not None)
-    return next((one for one in singles if one.label == label), None)
-
-
-def _final(best: Judged | None, plain: Fit, faulty: Sequence[str]) -> Fit:
-    """The fit that predicts: of the best explanation, without model error; else of the machine as calibrated."""
-    first = best.fit if best else None
-    if first is None:
-        return plain
-    try:
-        return refit_to_predict(first, plain, faulty)
-    except ArithmeticError:  # no solution without what model error allows
-        return first
 
 
 def _terms(best: Judged | None, final: Fit) -> tuple[Term, ...]:
@@ -389,27 +310,6 @@ def _floor(setup: InferenceSetup, factors: RandomHeat) -> str:
 
 
 # ---------------------------------------------------------------------- fits and courses
-
-
-def _fits(setup: InferenceSetup, predictions: Predictions, counting: Collection[str]) -> Fits:
-    columns = temperatures(setup.channels, counting)
-    nothing = [np.zeros((0, len(setup.channels)))]
-    each = {
-        state: rmse(np.concatenate([p.residual for p in found] or nothing),
-                    np.concatenate([p.weights for p in found] or [np.zeros(0)]))
-        for state, found in predictions.items()
-    }  # fmt: skip
-    overall = {state: overall_rmse(found, columns) for state, found in predictions.items()}
-
-    def alone(recording: str, state: str) -> float:
-        return overall_rmse([p for p in predictions[state] if p.piece.recording == recording], columns)
-
-    recordings = {
-        name: Errors(*(alone(name, model) for model in MODELS))
-        for name in dict.fromkeys(p.piece.recording for p in predictions["before"])
-    }
-    sensors = {name: Errors(*(float(each[model][i]) for model in MODELS)) for i, name in enumerate(setup.channels)}
-    return Fits(**overall, sensors=sensors, recordings=recordings)
 
 
 def _courses(setup: InferenceSetup, predicted: Predicted) -> tuple[PredictedRun, ...]:

@@ -19,7 +19,7 @@ from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.recorder import simulated_as_recorded
 from diagnosis.recordings.recording import Recording
 from diagnosis.report.write import correction_of
-from diagnosis.results import assemble, predictions
+from diagnosis.results import held_out, predictions
 from models.assembly.gearbox import Gearbox
 from models.correction.correction import MODEL_ERROR
 from models.files.cycle import Cycle
@@ -100,7 +100,7 @@ def test_an_effect_without_a_name_is_left_out_where_held_out_readings_contradict
     z[0] = experiment.unknowns[len(single.fitted.z)].z_of(300.0)
     fit = experiment.fit(np.concatenate([single.fitted.z, z]), iterations=0)
     pair = Judged(effects=(*single.effects, harmful), log_bayes=120.0, fit=fit, error_class=single.error_class)
-    monkeypatch.setattr(assemble, "_final", lambda best, plain, _: best.fit if best else plain)
+    monkeypatch.setattr(held_out, "_final", lambda best, plain, _: best.fit if best else plain)
     answers = [Answer(best=pair, effect=effect, grade="claim", probability=0.95, joint=0.95) for effect in pair.effects]
     certain = posterior_of(prepared[2], single, pair, log_e=1e6)  # whatever the held-out readings take off
     found = assembled(certain, answers[:named])

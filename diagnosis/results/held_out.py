@@ -1,0 +1,176 @@
+"""Answers held against the held-out recordings, which can take back a claim, a term of the model, or the detection."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from diagnosis.decision.answer import Answer, decide, withdraw_claim
+from diagnosis.decision.posterior import Judged, Posterior
+from diagnosis.engine.calibration import Calibration
+from diagnosis.engine.fit import Experiment, Fit
+from diagnosis.engine.predict import overall_rmse, rmse
+from diagnosis.engine.prepare import held_out_experiment
+from diagnosis.engine.set_apart import refit_to_predict
+from diagnosis.forward.whitening import RandomHeat
+from diagnosis.results.predictions import Predicted, Predictions, predict_recordings, temperatures
+from diagnosis.results.result_parts import MODELS, Errors, Fits, Refuted, named
+from diagnosis.setup.inference_setup import InferenceSetup
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PredictingModel:
+    """A model that predicts all recordings.
+
+    Attributes
+    ----------
+    best : Judged or None
+        The explanation in it; None: the machine as calibrated
+    predicted : Predicted
+    train, holdout : Fits
+    contradicted : bool
+        True if the held-out recordings contradict the explanation
+    """
+
+    best: Judged | None
+    predicted: Predicted
+    train: Fits
+    holdout: Fits
+    contradicted: bool
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Confronted:
+    """The decision after the held-out recordings had their say.
+
+    Attributes
+    ----------
+    posterior : Posterior
+    answers : sequence of Answer
+        To report
+    best : Judged or None
+        Their explanation
+    log_score_gain : float
+        Of it on the held-out readings, [nat]
+    contradicted : bool
+        True if the held-out recordings contradict the answers
+    model : PredictingModel
+        With `best`, but where that makes held-out temperatures worse
+    without_second : bool
+        True if a second effect, without a name, was left out because it does the harm
+    refuted : Refuted or None
+        What would have been detected without the held-out recordings
+    """
+
+    posterior: Posterior
+    answers: Sequence[Answer]
+    best: Judged | None
+    log_score_gain: float
+    contradicted: bool
+    model: PredictingModel
+    without_second: bool
+    refuted: Refuted | None
+
+
+def confront(
+    setup: InferenceSetup, experiment: Experiment, posterior: Posterior, answers: Sequence[Answer], *,
+    plain: Fit, calibration: Calibration, faulty: Sequence[str],
+) -> Confronted:  # fmt: skip
+    """Predict the held-out recordings by the answers, and withdraw what they contradict.
+
+    Parameters
+    ----------
+    experiment, answers, plain, calibration
+        See :func:`diagnosis.results.assemble.assemble`
+    faulty : sequence of str
+        Channels that do not count
+    """
+    counting = [name for name in setup.channels if name not in faulty]
+    draught = calibration.near.experiment.random_heat.draught
+    held_out = held_out_experiment(setup, experiment).with_random_heat(RandomHeat(draught=draught))
+
+    def model_with(best: Judged | None) -> PredictingModel:
+        predicted = predict_recordings(
+            experiment, held_out, plain=plain, found=_final(best, plain, faulty),
+            explanation=None if faulty else best or posterior.nothing, near=calibration.near, counting=counting,
+            noise_K=setup.noise_K,
+        )  # fmt: skip
+        train, holdout = (_fits(setup, one, counting) for one in (predicted.train, predicted.holdout))
+        contradicted = holdout.contradict(predicted.holdout_gain, setup.noise_K, posterior.class_threshold)
+        if best is not None and best.error_class.is_large and all(one.how == "always" for one in best.effects):
+            contradicted |= predicted.holdout_gain < posterior.rule.confirmed
+        return PredictingModel(best=best, predicted=predicted, train=train, holdout=holdout,
+                               contradicted=contradicted and not faulty)  # fmt: skip
+
+    model, much, without_second, refuted = model_with(_best(posterior, answers)), False, False, None
+    single = _named_alone(posterior, answers) if model.contradicted else None
+    if single is not None and not (alone := model_with(single)).contradicted:  # what has no name does the harm
+        model, answers = alone, [replace(answer, best=single) for answer in answers]
+        much, without_second = posterior.leaves_much(single), True
+    both = posterior.log_e + model.predicted.holdout_gain
+    if model.best is not None and posterior.detected and both < posterior.threshold and not faulty:
+        names = " and ".join(named(effect.mechanism, effect.place) for effect in model.best.effects)
+        refuted = Refuted(names=names, log_e_value=posterior.log_e, log_score_gain=model.predicted.holdout_gain)
+        posterior = replace(posterior, log_e=both)
+        answers, much, without_second = decide(posterior), False, False
+        model = model_with(_best(posterior, answers))
+    best, gain, contradicted = model.best, model.predicted.holdout_gain, model.contradicted and bool(answers)
+    if contradicted or much:
+        answers = [withdraw_claim(answer, posterior.rule) for answer in answers]
+    if contradicted and model.holdout.after > model.holdout.calibrated:
+        train, holdout, model = model.train, model.holdout, model_with(None)
+        model = replace(model, train=replace(model.train, found=train.found),
+                        holdout=replace(model.holdout, found=holdout.found))  # fmt: skip
+    return Confronted(posterior=posterior, answers=answers, best=best, log_score_gain=gain, contradicted=contradicted,
+                      model=model, without_second=without_second, refuted=refuted)  # fmt: skip
+
+
+def _best(posterior: Posterior, answers: Sequence[Answer]) -> Judged | None:
+    """The explanation that predicts: of the answers, else the most probable one, which needs no name for that."""
+    if answers:
+        return answers[0].best
+    fitted = (one for one, _ in posterior.ranked if one.fit is not None and one.kind != "nothing")
+    return next(fitted, None) if posterior.detected else None
+
+
+def _named_alone(posterior: Posterior, answers: Sequence[Answer]) -> Judged | None:
+    """The effect with a name without the one next to it, fitted; None if both have names, or there is one effect."""
+    if len(answers) != 1 or len(answers[0].best.effects) == 1:
+        return None
+    label = answers[0].effect.label
+    singles = (one for one in posterior.judged if len(one.effects) == 1 and one.fit is not None)
+    return next((one for one in singles if one.label == label), None)
+
+
+def _final(best: Judged | None, plain: Fit, faulty: Sequence[str]) -> Fit:
+    """The fit that predicts: of the best explanation, without model error; else of the machine as calibrated."""
+    first = best.fit if best else None
+    if first is None:
+        return plain
+    try:
+        return refit_to_predict(first, plain, faulty)
+    except ArithmeticError:  # no solution without what model error allows
+        return first
+
+
+def _fits(setup: InferenceSetup, predictions: Predictions, counting: Collection[str]) -> Fits:
+    columns = temperatures(setup.channels, counting)
+    nothing = [np.zeros((0, len(setup.channels)))]
+    each = {
+        state: rmse(np.concatenate([p.residual for p in found] or nothing),
+                    np.concatenate([p.weights for p in found] or [np.zeros(0)]))
+        for state, found in predictions.items()
+    }  # fmt: skip
+    overall = {state: overall_rmse(found, columns) for state, found in predictions.items()}
+
+    def alone(recording: str, state: str) -> float:
+        return overall_rmse([p for p in predictions[state] if p.piece.recording == recording], columns)
+
+    recordings = {
+        name: Errors(*(alone(name, model) for model in MODELS))
+        for name in dict.fromkeys(p.piece.recording for p in predictions["before"])
+    }
+    sensors = {name: Errors(*(float(each[model][i]) for model in MODELS)) for i, name in enumerate(setup.channels)}
+    return Fits(**overall, sensors=sensors, recordings=recordings)
