@@ -19,7 +19,7 @@ from diagnosis.engine.fit import calibrate
 from diagnosis.engine.known_switches import start_with_switches
 from diagnosis.engine.outside import outside_of
 from diagnosis.engine.prepare import prepare_experiment
-from diagnosis.engine.set_apart import calibrate_apart
+from diagnosis.engine.set_apart import calibrate_apart, calibrated_to_predict
 from diagnosis.forward.grid import Piece
 from diagnosis.recordings.read import named_apart, read_recordings
 from diagnosis.recordings.recording import Recording
@@ -136,7 +136,8 @@ def diagnose(
             rest = weigh(calibration.of_others, scan_at(calibration.of_others, candidates))
         progress("predicting the recordings free-running")
         return assemble(
-            setup, experiment, posterior, decide(posterior), plain=plain if rest is None else others,
+            setup, experiment, posterior, decide(posterior),
+            plain=calibrated_to_predict(plain if rest is None else others, calibration.fit, start),
             calibration=calibration,
             others=None if rest is None else Others(posterior=rest, channels=faulty, apart=tuple(apart)),
         )  # fmt: skip

@@ -10,7 +10,7 @@ from __future__ import annotations
 import sys
 
 import numpy as np
-from fmpy import simulate_fmu
+from fmpy import read_model_description, simulate_fmu
 
 if len(sys.argv) != 2:
     sys.exit("usage: python examples/drive_cycle.py FMU")
@@ -26,6 +26,8 @@ inputs = np.empty(
 inputs["time"], inputs["speed"], inputs["torque"] = t, rpm * np.pi / 30.0, torque
 inputs["T_ambient"], inputs["air_speed"] = 10.0 + 273.15, 2.0
 
+variables = read_model_description(sys.argv[1]).modelVariables
+nodes = [v.name for v in variables if v.causality == "output" and v.name.endswith(".T")]
 result = simulate_fmu(
     sys.argv[1],
     start_time=0.0,
@@ -33,11 +35,12 @@ result = simulate_fmu(
     output_interval=1.0,
     input=inputs,
     start_values={"initial.T": 10.0 + 273.15, "factor.h_air": 1.2},
-    output=["oil.T", "pinion.T", "bearing_1.T", "loss.total", "torque_loss", "efficiency", "in_domain"],
+    output=[*nodes, "loss.total", "torque_loss", "efficiency", "in_domain"],
 )
-print("time/s  oil/degC  pinion/degC  loss/W  efficiency")
+hottest = max(nodes, key=lambda name: result[name].max())
+print(f"time/s  oil/degC  {hottest}/degC  loss/W  efficiency")
 for row in result[::180]:
     print(
-        f"{row['time']:6.0f} {row['oil.T'] - 273.15:9.1f} {row['pinion.T'] - 273.15:12.1f} "
+        f"{row['time']:6.0f} {row['oil.T'] - 273.15:9.1f} {row[hottest] - 273.15:{len(hottest) + 6}.1f} "
         f"{row['loss.total']:7.1f} {row['efficiency']:11.4f}"
     )

@@ -133,7 +133,10 @@ def _mapped_columns(
     roles: dict[str, Column] = {}
     for name, column in mapping.columns.items():
         if name not in present:
-            problems.add(f"column {name} of its mapping file is missing{did_you_mean(name, present)}")
+            problems.add(
+                f"column {name} of its mapping file is missing{did_you_mean(name, present)}; if only some of the files "
+                "have it, state optional = true for it"
+            )
         elif column.quantity not in known:
             problems.add(
                 f"column {name} is {column.quantity!r} in its mapping file, which this gearbox does not have"

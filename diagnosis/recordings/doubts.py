@@ -68,6 +68,7 @@ def _hot(found: RecordedRows, network: RecordedMachine) -> Iterator[str]:
     if np.isfinite(ambient).any() and np.nanmean(ambient) > HOT_AIR:
         name = found.names.get("T_ambient", "T_ambient")
         yield f"{name}: {np.nanmean(ambient):.0f} degC on average is hot for ambient air; {advice}"
+    if "T_ambient" in found.names:  # in another unit it would be hot as well
         return
     firsts = [values[np.isfinite(values)][0] for values in _temperatures(found, network).values()]
     if len(firsts) > 1 and min(firsts) > HOT_AIR and max(firsts) - min(firsts) < COLD_START_K:

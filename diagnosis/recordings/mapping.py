@@ -76,6 +76,7 @@ class Column(Section):
     gain_sd: Positive | None = None
     valid: tuple[float, float] | None = None
     rows: tuple[str, ...] | None = None
+    optional: bool = False
 
     @property
     def channel(self) -> str:
@@ -283,7 +284,7 @@ def read_mapping(path: Path) -> RecordingMapping:
     """
     values = toml_file.parse(toml_file.read_text(path), file=str(path))
     if "schema" not in values:
-        raise InputError(f"{path}: has no 'schema = {SCHEMA}', so it is not known to be a mapping file of this version")
+        raise InputError(f"{path}: has no 'schema = {SCHEMA}'; begin a mapping file with that line")
     return validate_section(RecordingMapping, values, file=str(path))
 
 
@@ -316,6 +317,13 @@ def mapping_of_definition(values: Mapping[str, Any]) -> RecordingMapping:
     """
     table = toml_file.with_tuples(dict(values))
     return validate_section(RecordingMapping, table, file="[recording] of the gearbox definition")
+
+
+def without_absent(mapping: RecordingMapping, columns: Iterable[str]) -> RecordingMapping:
+    """Leave out optional columns that a file does not have: the mapping of a folder may be of files that differ."""
+    present = set(columns)
+    kept = {name: column for name, column in mapping.columns.items() if name in present or not column.optional}
+    return mapping.model_copy(update={"columns": kept})
 
 
 def reduced_to(mapping: RecordingMapping, columns: Iterable[str]) -> RecordingMapping:

@@ -352,8 +352,9 @@ def _segments(found: RecordedRows, gap: float) -> tuple[slice, ...]:
     alone = len(pieces) - len(segments)
     if len(pieces) > 1:
         cuts = found.rows[[piece.start for piece in pieces[1:]]]
+        gaps = "1 gap" if len(cuts) == 1 else f"{len(cuts)} gaps"
         found.notes.append(
-            f"{len(cuts)} gaps longer than {gap:g} s split it into {len(pieces)} pieces (before {rows_text(cuts)})"
+            f"{gaps} longer than {gap:g} s split it into {len(pieces)} pieces (before {rows_text(cuts)})"
             + (f"; {alone} of a single row are not used" if alone else "")
         )
     return segments

@@ -74,8 +74,13 @@ def _names(diagnosis: Diagnosis) -> list[tuple[str, str, float]]:
     for one in diagnosis.ranking:
         for law in dict.fromkeys(one.laws):
             sums[law] = sums.get(law, 0.0) + one.probability
-    for law, finding in reported.items():  # of a nearest name less is stated than was calculated
-        sums[law] = finding.probability if finding.acts_like else max(sums.get(law, 0.0), finding.probability)
+    # Of a nearest name less is stated than was calculated, and so it is of all names that are not reported then.
+    stated = {
+        law: f.probability if f.acts_like else max(sums.get(law, 0.0), f.probability) for law, f in reported.items()
+    }
+    share = min((f.probability / max(sums.get(law, 0.0), f.probability) for law, f in reported.items() if f.acts_like),
+                default=1.0)  # fmt: skip
+    sums = {law: share * p for law, p in sums.items()} | stated
     # Names that explain the data only together with a finding.
     companions = {rival.law for one in diagnosis.findings for rival in one.confusable_with if not rival.instead}
     idle = set() if diagnosis.further_helps else companions

@@ -11,6 +11,7 @@ from diagnosis.results.result_parts import PARAMETER, Finding
 from models.quantities.quantities import TOTAL_LOSS
 
 DAY, HOUR, MINUTE = 86_400.0, 3600.0, 60.0
+KEYS = ("T_ambient_degC", "bias_sd", "gain_sd")  # that advice tells to write into a file
 WEEKS_S, LONG_S, SHORT_S = 14.0 * DAY, 2.0 * HOUR, 5.0 * MINUTE  # above: in days, in hours; below: in seconds
 UNITS = {"1": "", "degC": "°C", "W/degC": "W/K", "N.m": "N m", "rpm": "1/min"}
 LOSS = TOTAL_LOSS
@@ -20,7 +21,7 @@ MOST_WINDOWS = 12  # of a recording that are told
 # Shown when hovering a term, and all together at the end of the page.
 WORDS: Mapping[str, str] = {
     "as delivered": "The model as its definition has it, before any recording was seen.",
-    "calibrated": "The same model with its existing parameters tuned to the recordings, each inside its prior. What a "
+    "calibrated": "The same model with its existing parameters fitted to the recordings and to their priors. What a "
     "correction is worth counts against this, not against the model as delivered.",
     "corrected": "The model with the found physics, and with what was learnt of model error where a model can hold it.",
     "held out": "Recordings that nothing was fitted to: their error is that of a model that got their inputs and no "
@@ -109,8 +110,8 @@ def plain(text: str) -> str:
 
     Examples
     --------
-    >>> plain("windage at housing_lower: on at 60 degC.")
-    'windage at housing lower: on at 60 °C'
+    >>> plain("windage at housing_lower: on at 60 degC."), plain("state bias_sd of T_oil")
+    ('windage at housing lower: on at 60 °C', 'state bias_sd of T oil')
     """
     return clause(_spelled(text))
 
@@ -119,6 +120,11 @@ def _spelled(text: str) -> str:
     """Names in words; the course of an effect in time, which is the end of its name, too."""
     for ending, words in COURSES.items():
         text = re.sub(rf"_{ending}\b", f" {words}", text)
+    parts = re.split(rf"\b({'|'.join(KEYS)})\b", text)  # keys and columns are typed as they are
+    return "".join(part if part in KEYS else _words(part) for part in parts)
+
+
+def _words(text: str) -> str:
     return re.sub(r"\bT_ambient\b", "ambient temperature", text).replace("__", " ").replace("_", " ")
 
 
@@ -130,7 +136,7 @@ def clause(text: str) -> str:
     >>> clause("temperature of oil above 60 degC.")
     'temperature of oil above 60 °C'
     """
-    return text.replace("degC", "°C").strip().removesuffix(".")
+    return re.sub(r"\bdegC\b", "°C", text).strip().removesuffix(".")
 
 
 def sentence(text: str) -> str:

@@ -30,7 +30,7 @@ VERDICT_TEXT: Mapping[str, str] = {
     "missing_physics": "The machine shows physics that the model leaves out.",
     "sensor_fault": "A sensor, clock or recorded input is at fault, not the machine.",
     "unexplained": "Something is missing, and no name of the catalogue is certain enough.",
-    "insufficient_data": "These recordings are too short or too calm, or the model fits too badly, to decide.",
+    "insufficient_data": "Nothing stands out, but that means little: nearly everything could hide in these recordings.",
 }
 PARTLY = "Part of what is missing has a name; of the rest none is certain enough."
 LIKELY_TEXT: Mapping[str, str] = {  # of the same verdicts where no name is a claim
@@ -82,7 +82,11 @@ def first_screen_of(d: Diagnosis) -> tuple[tuple[str, tuple[str, ...]], ...]:
 
 def _missing(d: Diagnosis) -> str:
     if d.verdict == "insufficient_data":
-        return "These data cannot decide it."
+        hidden = len({one.mechanism for one in d.unseen})
+        return (
+            f"Not decided: {hidden} effects could hide that change a temperature by {d.settings.matters_K:g} K "
+            "(--matters-K), because the recordings are too short or too calm for them or the model fits too badly."
+        )
     why = f"false-alarm rate of {100.0 * d.settings.false_alarm_rate:g} % asked for"
     if d.assumed.placebo is not None and d.threshold == d.assumed.placebo.log_e_value:
         why = f"as much as the baseline '{d.assumed.placebo.session}' brings"

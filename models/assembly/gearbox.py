@@ -403,8 +403,9 @@ class Gearbox:
         (66.5, 0.9837)
         """
         return (network or self.network()).steady_state(
-            losses=self.loss_laws(), speed=speed, torque=torque, inputs=inputs
-        )
+            losses=self.loss_laws(), speed=speed, torque=torque, inputs=inputs,
+            trained=None if self.is_parametric else self.training,
+        )  # fmt: skip
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return every value by its path: ``value``, its standard deviation ``sd`` where one is given, ``source``.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal, Self
@@ -109,7 +110,7 @@ class Definition(Section):
     def _tables_agree(self) -> Self:
         faults = [*_duplicate_names(self), *_unknown_names(self)]
         # What follows reads the tables by their names.
-        faults = faults or [*_load_shares(self), *_shafts_in_gears(self), *_oil_level(self)]
+        faults = faults or [*_load_shares(self), *_shafts_in_gears(self), *_oil_level(self), *_oil_volume(self)]
         if faults:
             raise ValueError("\n".join(faults))
         return self
@@ -186,4 +187,15 @@ def _oil_level(definition: Definition) -> Iterator[str]:
         yield (
             f"oil.level_below_axis_mm: {level:g} mm is outside the housing, whose height_m is {1e-3 * height:g}; "
             f"{-height:g} to {height:g} mm is possible (positive below the axis)"
+        )
+
+
+def _oil_volume(definition: Definition) -> Iterator[str]:
+    """Refuse more oil than a body of the housing's inside area can hold: a ball, by the isoperimetric inequality."""
+    volume, area = definition.oil.volume_l, definition.housing.inside_area_m2
+    most = 1e3 * area**1.5 / (6.0 * math.sqrt(math.pi))
+    if volume > most:
+        yield (
+            f"oil.volume_l: {volume:g} l do not fit into the housing; with its inside_area_m2 of {area:g} even a ball "
+            f"holds no more than {most:.3g} l: correct one of them"
         )

@@ -67,7 +67,9 @@ def filled_by_designation(own: dict[str, Any], notes: Annotations, path: str) ->
     if name not in _catalogue():
         first, *_, last, other = known_bearings()
         known = f"known are {first} to {last} and {other}"
-        text = f"sizes of {named!r} are not known; give {', '.join(missing)} ({known})"
+        text = (f"sizes of {named!r} are not known; give {', '.join(missing)} ({known}). Other bearings than cylindrical "
+                "roller bearings are not supported: describe their machine without geometry, as "
+                "python -m builder new FILE --like reducer does")  # fmt: skip
         notes.faults.append((f"{path}.designation", text))
         return own
     values, its_notes = _catalogue()[name]

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from models.base.errors import InputError, did_you_mean
 from models.base.types import Array, Numeric
+from models.definition.sections import Training
 from models.network.structure import Losses, Network
 from models.portable import solver
 from models.portable.evaluation import NetworkSystem
@@ -33,6 +34,7 @@ def steady_state(
     torque: ArrayLike | None = None,
     inputs: Mapping[str, ArrayLike] | None = None,
     parameters: Mapping[str, ArrayLike] | None = None,
+    trained: Training | None = None,
     max_iterations: int = 2000,
 ) -> SteadyState:
     """Temperatures and losses at which nothing changes any more.
@@ -46,6 +48,8 @@ def steady_state(
     inputs : mapping of input name to ArrayLike, shape () or (B,), or None
         Further inputs, e.g. ``T_ambient``
     parameters : mapping of name to ArrayLike, shape () or (B,), or None
+    trained : Training or None
+        Range that the definition names; outside it the result is not ``in_domain``
     max_iterations : int
 
     Returns
@@ -96,6 +100,7 @@ def steady_state(
             found = evaluate(
                 network, losses, wide, time=np.zeros(1), table=table[:, None, :], states=T[:, None, :],
                 heat_in=np.zeros((*rows, 1)), heat_out=np.zeros((*rows, 1, system.n_boundaries)),
+                trained=trained,
             )  # fmt: skip
             return _at_points(found, shape)
         # Longer steps while it settles, shorter ones where losses that rise with temperature make it overshoot.

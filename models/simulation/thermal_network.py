@@ -402,9 +402,12 @@ class ThermalNetwork(Network):
         torque: ArrayLike | None = None,
         inputs: Mapping[str, ArrayLike] | None = None,
         parameters: Mapping[str, ArrayLike] | None = None,
+        trained: Training | None = None,
     ) -> SteadyState:
         """Temperatures and losses at rest; see :func:`models.simulation.steady_state.steady_state`."""
-        return steady_state(self, losses=losses, speed=speed, torque=torque, inputs=inputs, parameters=parameters)
+        return steady_state(
+            self, losses=losses, speed=speed, torque=torque, inputs=inputs, parameters=parameters, trained=trained
+        )
 
     # ------------------------------------------------------------------ checks
 

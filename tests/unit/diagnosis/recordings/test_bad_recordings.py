@@ -154,7 +154,14 @@ MAPPINGS: list[tuple[str, tuple[str, ...]]] = [
     (COLUMN + 'quantity = "T_oil"\nvalid = [200, 210]', ("60 values outside 200 ... 210", "none is left")),
     (COLUMN + 'quantity = "T_oil"\nrows = ["9000.."]', ("T_oil_degC has no value",)),
     (COLUMN + 'quantity = "T_oil"\nrows = ["morning"]', ("rows of column T_oil_degC", "'morning' names no part")),
-    ('schema = 1\n[columns.T_sump]\nquantity = "T_oil"', ("column T_sump of its mapping file is missing",)),
+    (
+        'schema = 1\n[columns.T_sump]\nquantity = "T_oil"',
+        ("column T_sump of its mapping file is missing", "state optional = true"),
+    ),
+    (
+        'schema = 1\n[columns.n]\nquantity = "speed"\noptional = true\n[columns.speed_rpm]\nquantity = "ignore"',
+        ("column speed_rpm is missing",),
+    ),
     (COLUMN + 'quantity = "T_oil"\n[columns.P_loss_W]\nquantity = "T_oil"', ("both T_oil",)),
     ("schema = 1\n[constants]\nT_room = 5.0\n", ("constant 'T_room'",)),
     ("schema = 1\n[constants]\nT_ambient = 20.0\n", ("T_ambient is a constant", "column T_ambient_degC is there")),

@@ -61,6 +61,7 @@ def test_a_doubt_is_the_first_note(tmp_path: Path, fzg: Gearbox, case: str) -> N
     table(), table().drop(columns="T_ambient_degC"),
     table().assign(time_s=600.0 * NUMBERS),  # of a plant's records
     table().assign(T_oil_degC=80.0, T_pinion_degC=110.0).drop(columns="T_ambient_degC"),  # begun at work
+    table().assign(T_oil_degC=51.0 + NUMBERS / 100.0, T_pinion_degC=52.0 + NUMBERS / 100.0),  # begun warm, in cool air
     table().assign(torque_Nm=1.0), table().assign(torque_Nm=0.0),  # without load
 ])  # fmt: skip
 def test_a_sound_recording_raises_none(tmp_path: Path, fzg: Gearbox, source: pd.DataFrame) -> None:

@@ -299,6 +299,8 @@ def test_the_bar_of_a_nearest_name_is_what_is_stated_of_it() -> None:
     bars = {bar.name: dict(zip(bar.y, bar.x, strict=True)) for bar in
             figure_of(names_by_grade(replace(missing_physics(), findings=(nearest,)))).data}  # fmt: skip
     assert bars["likely"] == {"windage": 0.2}
+    # The same factor for all, or a name that is less probable would have the longer bar.
+    assert bars["not reported"]["pocketing"] == pytest.approx(0.061 * 0.2 / 0.914)
 
 
 def test_a_name_that_only_comes_with_another_is_shown_if_the_data_ask_for_more() -> None:

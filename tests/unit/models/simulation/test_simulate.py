@@ -139,6 +139,13 @@ def test_losses_need_their_nodes() -> None:
         network_system(small, LOSSES)
 
 
+def test_a_steady_state_outside_the_range_of_the_definition_is_not_in_its_domain() -> None:
+    usual, hot = (GEARBOX.steady_state(speed=1500.0, torque=torque) for torque in (94.0, 2000.0))
+    assert usual.columns()["in_domain"] and not hot.columns()["in_domain"]
+    along = GEARBOX.steady_state(speed=[1500.0, 20000.0], torque=94.0)
+    assert along.columns()["in_domain"].tolist() == [True, False]
+
+
 def test_steady_state_refusals() -> None:
     with pytest.raises(InputError, match="'T_ambiente' is not an input of this network; did you mean 'T_ambient'"):
         NETWORK.steady_state(losses=LOSSES, speed=1.0, torque=1.0, inputs={"T_ambiente": 3.0})
