@@ -19,7 +19,8 @@ from diagnosis.engine.fit import calibrate
 from diagnosis.engine.known_switches import start_with_switches
 from diagnosis.engine.outside import outside_of
 from diagnosis.engine.prepare import prepare_experiment
-from diagnosis.engine.set_apart import calibrate_apart, calibrated_to_predict
+from diagnosis.engine.set_apart import calibrate_apart
+from diagnosis.engine.to_predict import calibrated_to_predict
 from diagnosis.forward.grid import Piece
 from diagnosis.recordings.read import named_apart, read_recordings
 from diagnosis.recordings.recording import Recording

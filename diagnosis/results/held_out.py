@@ -13,7 +13,7 @@ from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.predict import overall_rmse, rmse
 from diagnosis.engine.prepare import held_out_experiment
-from diagnosis.engine.set_apart import refit_to_predict
+from diagnosis.engine.to_predict import refit_to_predict
 from diagnosis.forward.whitening import RandomHeat
 from diagnosis.results.predictions import Predicted, Predictions, predict_recordings, temperatures
 from diagnosis.results.result_parts import MODELS, Errors, Fits, Refuted, named

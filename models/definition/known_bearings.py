@@ -67,9 +67,11 @@ def filled_by_designation(own: dict[str, Any], notes: Annotations, path: str) ->
     if name not in _catalogue():
         first, *_, last, other = known_bearings()
         known = f"known are {first} to {last} and {other}"
-        text = (f"sizes of {named!r} are not known; give {', '.join(missing)} ({known}). Other bearings than cylindrical "
-                "roller bearings are not supported: describe their machine without geometry, as "
-                "python -m builder new FILE --like reducer does")  # fmt: skip
+        text = (
+            f"sizes of {named!r} are not known; give {', '.join(missing)} ({known}). Bearings other than cylindrical "
+            "roller bearings are not supported: describe their machine without geometry, as "
+            "python -m builder new FILE --like reducer does"
+        )
         notes.faults.append((f"{path}.designation", text))
         return own
     values, its_notes = _catalogue()[name]

@@ -17,7 +17,8 @@ def diagnosed(fzg: Gearbox, monkeypatch: pytest.MonkeyPatch, **stages: Any) -> A
     idle: dict[str, Any] = {
         "prepare_experiment": lambda *_, **__: (None, SimpleNamespace(pieces=[SimpleNamespace(recording="made")])),
         "calibrate": lambda *_: None, "calibrate_apart": lambda *_: (None, ()),
-        "start_with_switches": lambda *_: None, "candidates_of": lambda *_: (), "outside_of": lambda *_: (),
+        "start_with_switches": lambda *_: None, "calibrated_to_predict": lambda *_: None,
+        "candidates_of": lambda *_: (), "outside_of": lambda *_: (),
         "scan_at": lambda *_: None, "faulty_channels": lambda *_: (), "decide": lambda *_: (),
         "assemble": lambda setup, experiment, posterior, *_, **given: (posterior.name, given["calibration"].name),
     }  # fmt: skip
@@ -36,7 +37,7 @@ def test_all_is_judged_once_more_from_a_better_basin(
     fzg: Gearbox, monkeypatch: pytest.MonkeyPatch, seen_from: list[str], again: float, judged: list[str], reported: str
 ) -> None:
     def calibration(name: str, log_evidence: float) -> Any:
-        return SimpleNamespace(name=name, chosen=SimpleNamespace(log_evidence=log_evidence), of_others=None)
+        return SimpleNamespace(name=name, chosen=SimpleNamespace(log_evidence=log_evidence), of_others=None, fit=None)
 
     found: list[str] = []
 
@@ -61,7 +62,7 @@ def test_effects_are_weighed_in_still_air_and_in_draughts(
     fzg: Gearbox, monkeypatch: pytest.MonkeyPatch, worth: list[str], detected: dict[str, float], reported: str
 ) -> None:
     both: dict[str, Any] = {
-        name: SimpleNamespace(name=name, chosen=SimpleNamespace(log_evidence=evidence), of_others=None)
+        name: SimpleNamespace(name=name, chosen=SimpleNamespace(log_evidence=evidence), of_others=None, fit=None)
         for name, evidence in (("still", 0.0), ("draughts", 100.0))
     }
     rivals: list[float] = []

@@ -56,5 +56,5 @@ def test_an_unknown_designation_is_one_fault_that_says_what_to_give(tmp_path: Pa
     lines = str(caught.value).splitlines()
     assert len(lines) == 4  # one per bearing, and no line for every key that follows from it
     assert "bearing 'bearing_1'.designation: sizes of 'NU 999' are not known; give bore_mm" in lines[0]
-    assert "Other bearings than cylindrical roller bearings are not supported" in lines[0]
+    assert "Bearings other than cylindrical roller bearings are not supported" in lines[0]
     assert "known are NU 204 to NU 220 and NU 406" in lines[0]
