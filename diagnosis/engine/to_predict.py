@@ -16,7 +16,7 @@ from models.base.types import Array
 from models.quantities.quantities import is_total_loss
 from models.terms.term import Term
 
-QUIET = (0.3, 0.1)  # times the random heat that is assumed
+QUIET = RandomHeat(heat=0.1, wander=0.1)  # times the random heat that is assumed
 FAR_OFF = 2.0  # times the least error of the temperatures, beyond which a fit predicts too badly to be chosen
 
 
@@ -57,7 +57,7 @@ def _most_probable(
         If there is no solution.
     """
     tried: list[tuple[Experiment, Array | None]] = [(free, z) for z in starts]
-    tried += [(free.with_random_heat(RandomHeat(heat=times, wander=times)), z) for times in QUIET for z in quiet]
+    tried += [(free.with_random_heat(QUIET), z) for z in quiet]
     for experiment, z in tried:
         with suppress(*NO_SOLUTION):
             reached.append(calibrate(experiment, z, guesses))
