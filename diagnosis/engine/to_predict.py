@@ -101,7 +101,7 @@ def refit_to_predict(fit: Fit, plain: Fit, apart: Collection[str] = ()) -> Fit:
     counting = without_channels(every, apart) if apart else every
     nominal = fit.z.copy()
     nominal[: len(plain.z)] = plain.z_in(every)
-    found = _most_probable(counting, [], [fit.z], [fit.z, nominal], fit.trajectories)
+    found = _most_probable(counting, [], [fit.z, nominal], [fit.z, nominal], fit.trajectories)
     if not apart:
         return found
     terms = {term.label: term for term in every.machine.terms}
