@@ -22,8 +22,7 @@ PROGRAM = "python -m builder"
 GEARBOX_HELP = f"Name ({', '.join(known_gearboxes())}) or definition file (TOML)."
 JOBS_HELP = "Processes on this machine."
 DASK_HELP = "Scheduler of a Dask cluster to work on instead, e.g. tcp://host:8786."
-DEFAULT = Settings()
-OPTIONS = {
+SETTINGS = {
     "false_alarm_rate": ("--false-alarm-rate", "P", "How often a healthy machine may be called inconsistent: an aim."),
     "matters_K": ("--matters-K", "K", "Change of a temperature from which an effect matters."),
     "matters_W": ("--matters-W", "W", "The same of a heat; 0: by temperatures alone."),
@@ -98,13 +97,13 @@ def settings_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
     @wraps(command)
     def with_settings(*args: Any, **given: Any) -> Any:
-        settings = Settings(**{name: given.pop(name) for name in OPTIONS})
+        settings = Settings(**{name: given.pop(name) for name in SETTINGS})
         return command(*args, settings=settings, **given)
 
-    for name, (option, metavar, text) in reversed(OPTIONS.items()):
+    for name, (option, metavar, text) in reversed(SETTINGS.items()):
         low, high = LIMITS[name]
         with_settings = click.option(
-            option, name, type=FiniteRange(low, high), metavar=metavar, default=getattr(DEFAULT, name),
+            option, name, type=FiniteRange(low, high), metavar=metavar, default=getattr(Settings(), name),
             show_default=True, help=text,
         )(with_settings)  # fmt: skip
     return with_settings

@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 
 from builder.base import console
-from builder.base.options import FiniteRange, example
+from builder.base.options import FiniteRange, example, gearbox_option
 from builder.base.progress import LOADING, progress
 from models.assembly.gearbox import load_gearbox
 from models.base.errors import InputError
@@ -54,8 +54,7 @@ def _list_effects(context: click.Context, _: click.Parameter, asked: bool) -> No
 @click.option("--truth", type=click.Path(path_type=Path, file_okay=False), default=None, metavar="DIR",
               help="Folder for the truth.  [default: 'truth' in --output]")  # fmt: skip
 @click.option("--cases", type=click.IntRange(min=1, max=10_000), default=None, metavar="N", help="How many cases.")
-@click.option("--gearbox", default=None, metavar="NAME|FILE",
-              help="Name or definition file (TOML), of the own plant and of --into.  [default: fzg]")  # fmt: skip
+@gearbox_option("Name or definition file (TOML), of the own plant and of --into.  [default: fzg]", default=None)
 @click.option("--machine", default=None, metavar="NAME|FILE",
               help="Zoo: name or definition file (TOML).  [default: drawn]")  # fmt: skip
 @click.option(

@@ -36,8 +36,7 @@ NOT_REAL = (*ONLY_NEW, "recordings", "truth", "continued", "jobs")
               metavar="DIR", help="Recordings that exist, a folder per case, in place of --plant.")  # fmt: skip
 @click.option("--truth", type=click.Path(path_type=Path, exists=True), default=None, metavar="FILE|DIR",
               help="Truth of --recordings: one file, or <case>.json in a folder.")  # fmt: skip
-@click.option("--gearbox", default=None, metavar="NAME|FILE",
-              help="Name or definition file (TOML).  [default: fzg; zoo: drawn by family]")  # fmt: skip
+@gearbox_option("Name or definition file (TOML).  [default: fzg; zoo: drawn by family]", default=None)
 @click.option("--families", default="", metavar="NAME,...",
               help="Zoo: families of plants to draw from.  [default: all]")  # fmt: skip
 @click.option("--cells-every", type=click.IntRange(min=0), default=0, show_default=True, metavar="N",

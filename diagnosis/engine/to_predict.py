@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
@@ -21,7 +22,7 @@ FAR_OFF = 2.0  # times the least error of the temperatures, beyond which a fit p
 
 
 def calibrated_to_predict(plain: Fit, with_error: Fit, start: Array | None = None) -> Fit:
-    """The nominal machine calibrated by noise alone, as well as starts and sizes of random heat allow.
+    """The nominal machine calibrated by noise alone: the best of several calibrations.
 
     Parameters
     ----------
@@ -31,44 +32,40 @@ def calibrated_to_predict(plain: Fit, with_error: Fit, start: Array | None = Non
         The same machine calibrated with model error: another start
     start : Array, shape (unknowns,), or None
         Where the first calibration began; by default at the middles of the priors
-    """
-    return _most_probable(replace(plain.experiment, filters=None), [plain], [start], [with_error.z])
-
-
-def _most_probable(
-    free: Experiment, reached: list[Fit], quiet: Sequence[Array | None], starts: Sequence[Array],
-    guesses: Sequence[Guess] | None = None,
-) -> Fit:  # fmt: skip
-    """The most probable of some fits and of calibrations from further starts, of those that predict well.
-
-    Random heat lets a course drift off, so that where the model lacks much, a fit which misses the temperatures by many
-    kelvins may be the most probable one. With less random heat the courses stay near.
-
-    Parameters
-    ----------
-    quiet : sequence of Array, shape (unknowns,), or None
-        Starts with less random heat; None: at the middles of the priors
-    starts : sequence of Array, shape (unknowns,)
-        Starts with random heat as assumed
 
     Raises
     ------
     ArithmeticError
         If there is no solution.
     """
-    tried: list[tuple[Experiment, Array | None]] = [(free, z) for z in starts]
-    tried += [(free.with_random_heat(QUIET), z) for z in quiet]
-    for experiment, z in tried:
+    free = replace(plain.experiment, filters=None)
+    return _best_of(free, [plain, *_calibrations([(free, with_error.z), (free.with_random_heat(QUIET), start)])])
+
+
+def _calibrations(
+    tried: Iterable[tuple[Experiment, Array | None]], guesses: Sequence[Guess] | None = None
+) -> Iterator[Fit]:
+    """Experiments calibrated from starts; those without a solution are left out."""
+    for experiment, start in tried:
         with suppress(*NO_SOLUTION):
-            reached.append(calibrate(experiment, z, guesses))
-    settled: list[Fit] = []
+            yield calibrate(experiment, start, guesses)
+
+
+def _best_of(free: Experiment, reached: Iterable[Fit]) -> Fit:
+    """The most probable of some calibrations that predict well, judged by the noise that is assumed.
+
+    Random heat lets a course drift off, so that where the model lacks much, a fit which misses the temperatures by many
+    kelvins may be the most probable one. With less random heat the courses stay near.
+    """
+    settled: list[tuple[float, Fit]] = []
     for one in reached:  # a course that has not settled may look better than it is
         with suppress(*NO_SOLUTION):
-            settled.append(replace(one.experiment, filters=None).fit(one.z, iterations=0))
+            again = replace(one.experiment, filters=None).fit(one.z, iterations=0)
+            settled.append((_off_by(again), again))
     if not settled:
         raise ArithmeticError("the simulation has no solution without model error")
-    least = min(map(_off_by, settled))
-    best = max((one for one in settled if _off_by(one) <= FAR_OFF * least), key=lambda one: one.log_evidence)
+    farthest = FAR_OFF * min(off_K for off_K, _ in settled)
+    best = max((one for off_K, one in settled if off_K <= farthest), key=lambda one: one.log_evidence)
     return best if best.experiment.random_heat == AS_ASSUMED else free.fit(best.z, best.trajectories, iterations=0)
 
 
@@ -101,7 +98,8 @@ def refit_to_predict(fit: Fit, plain: Fit, apart: Collection[str] = ()) -> Fit:
     counting = without_channels(every, apart) if apart else every
     nominal = fit.z.copy()
     nominal[: len(plain.z)] = plain.z_in(every)
-    found = _most_probable(counting, [], [fit.z, nominal], [fit.z, nominal], fit.trajectories)
+    tried = product((counting, counting.with_random_heat(QUIET)), (fit.z, nominal))
+    found = _best_of(counting, _calibrations(tried, fit.trajectories))
     if not apart:
         return found
     terms = {term.label: term for term in every.machine.terms}

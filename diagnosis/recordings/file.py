@@ -22,7 +22,6 @@ from diagnosis.recordings.mapping import (
     mapping_beside,
     read_mapping,
     reduced_to,
-    without_absent,
 )
 from diagnosis.recordings.mdf import read_mdf
 from diagnosis.recordings.time_axis import ISO, RECORDING_KINDS, Clock, Part, clock_of, holds_dates, inside, part_of
@@ -136,7 +135,7 @@ def open_recording(path: Path, mapping: Path | None, usual: RecordingMapping) ->
         chunks = read_chunks(path, found.text_form)
     head = next(chunks)
     units = units_in_brackets(map(str, head.columns)) | units
-    found = (reduced_to if own is None else without_absent)(found, map(str, head.columns))
+    found = reduced_to(found, map(str, head.columns), of_definition=own is None)
     clock = None
     if found.time is not None:
         chunks, head = map(partial(_with_one_time, time=found.time), chunks), _with_one_time(head, found.time)

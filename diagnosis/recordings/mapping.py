@@ -319,16 +319,19 @@ def mapping_of_definition(values: Mapping[str, Any]) -> RecordingMapping:
     return validate_section(RecordingMapping, table, file="[recording] of the gearbox definition")
 
 
-def without_absent(mapping: RecordingMapping, columns: Iterable[str]) -> RecordingMapping:
-    """Leave out optional columns that a file does not have: the mapping of a folder may be of files that differ."""
-    present = set(columns)
-    kept = {name: column for name, column in mapping.columns.items() if name in present or not column.optional}
-    return mapping.model_copy(update={"columns": kept})
+def reduced_to(mapping: RecordingMapping, columns: Iterable[str], *, of_definition: bool) -> RecordingMapping:
+    """Leave out columns that a file does not have and need not have.
 
-
-def reduced_to(mapping: RecordingMapping, columns: Iterable[str]) -> RecordingMapping:
-    """Leave out columns that a file does not have: a definition names what such files may hold."""
+    Parameters
+    ----------
+    columns : iterable of str
+        Of the file
+    of_definition : bool
+        True for the mapping of a gearbox definition, which names what such files may hold; else each column states
+        whether it is optional
+    """
     present = set(columns)
-    kept = {name: column for name, column in mapping.columns.items() if name in present}
-    time = mapping.time if mapping.time is not None and present.issuperset(mapping.time.columns) else None
-    return mapping.model_copy(update={"columns": kept, "time": time})
+    kept = {name: column for name, column in mapping.columns.items()
+            if name in present or not (of_definition or column.optional)}  # fmt: skip
+    lacks_time = of_definition and mapping.time is not None and not present.issuperset(mapping.time.columns)
+    return mapping.model_copy(update={"columns": kept, "time": None if lacks_time else mapping.time})

@@ -60,7 +60,8 @@ def names_by_grade(diagnosis: Diagnosis) -> Chart | None:
     return Chart(
         name="names", title="How probable each name is", figure=figure,
         note=f"Dashed: the limit of a claim, {diagnosis.settings.claim_from:g}. A bar counts all explanations that "
-             "hold the name, so bars of effects that act together overlap and need not add up to 1.",
+             "hold the name, so bars of effects that act together overlap and need not add up to 1. Where "
+             "only the nearest name is known, less is stated of all than was calculated.",
         alt=f"Probabilities of names: {told}.",
     )  # fmt: skip
 
@@ -78,9 +79,9 @@ def _names(diagnosis: Diagnosis) -> list[tuple[str, str, float]]:
     stated = {
         law: f.probability if f.acts_like else max(sums.get(law, 0.0), f.probability) for law, f in reported.items()
     }
-    share = min((f.probability / max(sums.get(law, 0.0), f.probability) for law, f in reported.items() if f.acts_like),
+    factor = min((f.probability / max(sums.get(law, 0.0), f.probability) for law, f in reported.items() if f.acts_like),
                 default=1.0)  # fmt: skip
-    sums = {law: share * p for law, p in sums.items()} | stated
+    sums = {law: factor * p for law, p in sums.items()} | stated
     # Names that explain the data only together with a finding.
     companions = {rival.law for one in diagnosis.findings for rival in one.confusable_with if not rival.instead}
     idle = set() if diagnosis.further_helps else companions

@@ -11,7 +11,7 @@ from diagnosis.results.result_parts import PARAMETER, Finding
 from models.quantities.quantities import TOTAL_LOSS
 
 DAY, HOUR, MINUTE = 86_400.0, 3600.0, 60.0
-KEYS = ("T_ambient_degC", "bias_sd", "gain_sd")  # that advice tells to write into a file
+KEYS = ("T_ambient_degC", "bias_sd")  # that advice tells to write into a file
 WEEKS_S, LONG_S, SHORT_S = 14.0 * DAY, 2.0 * HOUR, 5.0 * MINUTE  # above: in days, in hours; below: in seconds
 UNITS = {"1": "", "degC": "°C", "W/degC": "W/K", "N.m": "N m", "rpm": "1/min"}
 LOSS = TOTAL_LOSS

@@ -20,7 +20,7 @@ from diagnosis.forward.whitening import RandomHeat
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.advice import next_test
 from diagnosis.results.findings import estimates_of, finding_of, joint_estimate_of, switch_errors
-from diagnosis.results.held_out import confront
+from diagnosis.results.held_out import validate
 from diagnosis.results.instruments import sensors_and_inputs_of
 from diagnosis.results.locations import locations_of
 from diagnosis.results.notes import baseline_notes, limit_notes, ratio_notes
@@ -93,13 +93,13 @@ def assemble(
         What all but faulty channels say, if there are any
     """
     faulty = () if others is None else others.channels
-    tried = confront(setup, experiment, posterior, answers, plain=plain, calibration=calibration, faulty=faulty)
-    posterior, best, final = tried.posterior, tried.best, tried.model.predicted.final
-    train, holdout = tried.model.train, tried.model.holdout
+    valid = validate(setup, experiment, posterior, answers, plain=plain, calibration=calibration, faulty=faulty)
+    posterior, best, final = valid.posterior, valid.best, valid.model.predicted.final
+    train, holdout = valid.model.train, valid.model.holdout
     settings, known = posterior.settings, setup.known
     reported = _distinct([
         (answer, finding_of(answer, answer.best.fit or final, setup, posterior))
-        for answer in tried.answers
+        for answer in valid.answers
     ])  # fmt: skip
     findings = tuple(finding for _, finding in reported)
     unseen = _unseen(setup, posterior, findings)
@@ -109,9 +109,9 @@ def assemble(
     verdict = verdict_of(posterior, [answer for answer, _ in reported], unseen, unfit=unfit)
     location = locations_of(setup, posterior) if posterior.detected or verdict in NO_CLAIM else ()
     inputs = setup.gearbox.network().inputs
-    most_probable = tried.model.best if others is None else others.posterior.nothing
+    most_probable = valid.model.best if others is None else others.posterior.nothing
     believed = (most_probable.fit if most_probable else None) or calibration.fit
-    model = _calibrated(final, believed, plain, inputs, tried.model.best.effects if tried.model.best else ())
+    model = _calibrated(final, believed, plain, inputs, valid.model.best.effects if valid.model.best else ())
     return Diagnosis(
         verdict=verdict,
         gearbox=setup.gearbox.name,
@@ -124,7 +124,7 @@ def assemble(
         train=train,
         holdout=holdout,
         faulty=faulty,
-        terms=_terms(tried.model.best, final),
+        terms=_terms(valid.model.best, final),
         known=known,
         alone=_calibrated(plain, calibration.fit, plain, inputs),
         joint=joint_estimate_of(final),
@@ -133,7 +133,7 @@ def assemble(
         floor=_floor(setup, calibration.near.experiment.random_heat),
         misfit=_misfit(final),
         remaining_nat=0.0 if _looked_no_further(best) else posterior.left_by(best),
-        remaining_note=_remaining(posterior, others, best) + (LEFT_OUT if tried.without_second else ""),
+        remaining_note=_remaining(posterior, others, best) + (LEFT_OUT if valid.without_second else ""),
         ranking=_ranking(posterior),
         unseen=unseen,
         not_tried=tuple(sorted(
@@ -144,22 +144,22 @@ def assemble(
             setup, verdict, findings, location if posterior.detected else (), unseen,
             calibration=model.calibration, missed=holdout.far_beyond(train, settings.matters_K),
         ),
-        courses=_courses(setup, tried.model.predicted),
+        courses=_courses(setup, valid.model.predicted),
         network=setup.nominal,
         shapes=setup.shapes,
-        learnt=tried.model.predicted.learnt,
-        left_out_K=tried.model.predicted.left_out_K,
+        learnt=valid.model.predicted.learnt,
+        left_out_K=valid.model.predicted.left_out_K,
         inputs=_provenance(setup),
         notes=(
-            *ratio_notes(final), *limit_notes(final), *baseline_notes(experiment, posterior, tried.answers),
+            *ratio_notes(final), *limit_notes(final), *baseline_notes(experiment, posterior, valid.answers),
             *_notes_of_recordings(setup),
         ),
         kinds={kind: posterior.of(kind) for kind in KINDS},
         settings=settings,
         assumed=posterior.assumed,
-        holdout_gain=tried.log_score_gain,
-        contradicted=tried.contradicted,
-        refuted=tried.refuted,
+        holdout_gain=valid.log_score_gain,
+        contradicted=valid.contradicted,
+        refuted=valid.refuted,
         spoiled=spoiled,
     )  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""Answers held against the held-out recordings, which can take back a claim, a term of the model, or the detection."""
+"""Validation of answers on held-out recordings, which can take back a claim, a term of the model, or the detection."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ class PredictingModel:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Confronted:
-    """The decision after the held-out recordings had their say.
+class Validated:
+    """A decision, validated on the held-out recordings.
 
     Attributes
     ----------
@@ -74,10 +74,10 @@ class Confronted:
     refuted: Refuted | None
 
 
-def confront(
+def validate(
     setup: InferenceSetup, experiment: Experiment, posterior: Posterior, answers: Sequence[Answer], *,
     plain: Fit, calibration: Calibration, faulty: Sequence[str],
-) -> Confronted:  # fmt: skip
+) -> Validated:  # fmt: skip
     """Predict the held-out recordings by the answers, and withdraw what they contradict.
 
     Parameters
@@ -123,7 +123,7 @@ def confront(
         train, holdout, model = model.train, model.holdout, model_with(None)
         model = replace(model, train=replace(model.train, found=train.found),
                         holdout=replace(model.holdout, found=holdout.found))  # fmt: skip
-    return Confronted(posterior=posterior, answers=answers, best=best, log_score_gain=gain, contradicted=contradicted,
+    return Validated(posterior=posterior, answers=answers, best=best, log_score_gain=gain, contradicted=contradicted,
                       model=model, without_second=without_second, refuted=refuted)  # fmt: skip
 
 

@@ -15,7 +15,13 @@ from diagnosis.report.page import page
 from diagnosis.results.first_screen import EITHER, VERDICT_TEXT
 from diagnosis.results.result import Diagnosis
 from diagnosis.results.result_parts import CalibratedModel, Change, Errors, Fits, Ranked, Rival, Switching
-from tests.unit.diagnosis.diagnosis_example import consistent, missing_physics, two_effects, unexplained
+from tests.unit.diagnosis.diagnosis_example import (
+    consistent,
+    insufficient_data,
+    missing_physics,
+    two_effects,
+    unexplained,
+)
 
 
 def told(diagnosis: Diagnosis, question: str) -> str:
@@ -30,6 +36,12 @@ def test_the_verdict_stands_first_then_the_questions_in_order() -> None:
     assert [line.split("?")[0] + "?" for line in lines[1:] if not line.startswith(" ")] == asked
     assert "5.21 K as delivered, 3.62 K calibrated, 0.52 K with the findings" in str(missing_physics())
     assert "41.3 nat, 3.9 needed" in lines[1]
+
+
+def test_where_little_could_be_seen_the_summary_states_how_much_could_hide_and_the_option() -> None:
+    line = "Not decided: 30 effects could hide that change a temperature by 4 K (--matters-K)"
+    asked = replace(insufficient_data(), settings=Settings(matters_K=4.0))
+    assert told(asked, "Is something missing?").startswith(line)
 
 
 def test_a_baseline_that_raises_the_threshold_is_told_with_it() -> None:
