@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.linalg import solve_triangular
 
 from diagnosis.engine.fit import NOISE_ALONE, Experiment, Fit, Linear
@@ -109,12 +110,12 @@ def _free_run(setting: Setting, piece: Piece, start: Array, guess: Array | None)
 def _start(experiment: Experiment, index: int, setting: Setting, until: float) -> Array:
     """Start temperatures of all parts, [degC]: as probable as can be by what the first minutes show."""
     model, whole = experiment.machine.model, experiment.pieces[index]
-    likely, sd = _likely_start(experiment, index)
+    likely, covariance = _likely_start(experiment, index)
     start, piece, noise = likely, whole.until(until), experiment.noise[index]
     early = replace(setting, samples=setting.samples[: len(piece.steps)])
     temperatures = [i for i, name in enumerate(piece.channels) if not is_total_loss(name)]
     seen = np.isfinite(piece.measured[:, temperatures])
-    channel_sd, precision, count = noise.channel_sd[temperatures], np.diag(1.0 / sd**2), len(likely)
+    channel_sd, precision, count = noise.channel_sd[temperatures], np.linalg.inv(covariance), len(likely)
     trajectory: Trajectory | None = None
     for _ in range(START_ROUNDS):
         adjusted = early.piece(piece, trajectory)
@@ -134,7 +135,7 @@ def _start(experiment: Experiment, index: int, setting: Setting, until: float) -
 
 
 def _likely_start(experiment: Experiment, index: int) -> tuple[Array, Array]:
-    """Start temperatures by the first rows alone, and their standard deviations, (unknown,) each.
+    """Start temperatures by the first rows alone, shape (unknown,), and their covariance, (unknown, unknown).
 
     A state that is solved with the temperatures, as the rise of oil in a tank above the air, may be as it was
     declared, or have risen as much as the gearbox.
@@ -145,8 +146,8 @@ def _likely_start(experiment: Experiment, index: int) -> tuple[Array, Array]:
     if "T_ambient" in inputs:
         risen = float(np.mean(parts) - experiment.pieces[index].inputs[0, inputs.index("T_ambient")])
     start = np.concatenate([parts, declared + 0.5 * risen])
-    sd = np.concatenate([experiment.noise[index].start_sd, np.full(len(declared), LEFT_ALONE_SD_K + 0.5 * abs(risen))])
-    return start, sd
+    alone = (LEFT_ALONE_SD_K + 0.5 * abs(risen)) ** 2 * np.eye(len(declared))
+    return start, block_diag(experiment.noise[index].start, alone)
 
 
 def rmse(residuals: Array, weights: Array) -> Array:

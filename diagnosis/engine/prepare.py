@@ -21,7 +21,7 @@ from diagnosis.engine.unknown import (
 from diagnosis.forward.grid import slow_rows
 from diagnosis.recordings.recording import Recording
 from diagnosis.setup.inference_setup import InferenceSetup, prepare
-from diagnosis.setup.noise import start_guess
+from diagnosis.setup.start import start_guess
 from diagnosis.setup.sessions import session_by_recording, start_times
 from diagnosis.setup.shaft import torque_gain
 from models.assembly.gearbox import Gearbox

@@ -69,8 +69,8 @@ class Noise:
         Random heat in the parts, [W]
     heat_time : float
         Its correlation time, [s]
-    start_sd : Array, shape (parts,)
-        Uncertainty of the start temperatures, [K]
+    start : Array, shape (parts, parts)
+        Covariance of the start temperatures, [K^2]
     wander : float
         Random share of the heat that a part gives to its surroundings, of each part by itself, [-]
     draught : float
@@ -85,7 +85,7 @@ class Noise:
     loss_relative_sd: float
     heat_sd: Array
     heat_time: float
-    start_sd: Array
+    start: Array
     wander: float = 0.0
     draught: float = 0.0
     capacity: float = 0.0
@@ -135,8 +135,8 @@ class Whitening:
         variance[:, range(m), range(m)] = np.where(self._seen, white, MISSING_VARIANCE)
         root, gains = np.empty((points, m, m)), np.empty((points, size, m))
         covariance = np.zeros((size, size))
-        covariance[range(n), range(n)] = float(noise.start_sd.max()) ** 2  # of a tank it is as little known as can be
-        covariance[range(model.n), range(model.n)] = noise.start_sd**2
+        covariance[range(n), range(n)] = noise.start.max()  # of a tank it is as little known as can be
+        covariance[: model.n, : model.n] = noise.start
         covariance[range(n, size), range(n, size)] = 1.0
         for k, (H, white_k) in enumerate(zip(observe, variance, strict=True)):
             if k:

@@ -11,8 +11,9 @@ from diagnosis.forward.grid import Piece, slow_rows, white_sd
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.whitening import Noise
 from diagnosis.recordings.recording import Recording
+from diagnosis.setup.start import start_covariance, start_guess
 from models.base.types import Array
-from models.quantities.quantities import is_total_loss, node_of_channel
+from models.quantities.quantities import is_total_loss
 
 LOWEST_SD_K, LOWEST_SD_W = 0.02, 0.5
 FEWEST_ROWS, DEFAULT_LOSS_RELATIVE = 50, 0.02
@@ -23,7 +24,6 @@ WANDER = 0.03  # of the heat to the surroundings: draughts; strangers' healthy m
 # heat and conductances put it, so its floor is told as a temperature.
 PARAMETRIC_FRACTION, PARAMETRIC_K = 0.05, 0.7
 SLOW_SD_K = 0.3  # at most, of rows minutes apart: what differs from row to row is operation then, not instrument
-START_KNOWN_K, START_UNKNOWN_K, START_UNKNOWN_SHARE = 2.0, 2.0, 0.15
 
 
 def loss_noise(recordings: Sequence[Recording]) -> tuple[float, float]:
@@ -102,19 +102,13 @@ def noise_of(
     heat_sd = np.where(heavy, HEAT_FRACTION * loss_W, 0.0)
     if parametric:
         heat_sd = np.where(heavy, PARAMETRIC_FRACTION * loss_W, PARAMETRIC_K * _conductances(model, piece))
-    measured = {node_of_channel(name, model.parts) for name in piece.channels}
-    known = np.array([name in measured for name in model.parts])
-    first = piece.measured[0, [not is_total_loss(name) for name in piece.channels]]
-    hot = float(np.nanmax(first)) if np.isfinite(first).any() else 50.0
-    ambient = _ambient(model, piece)
-    unknown = START_UNKNOWN_K + START_UNKNOWN_SHARE * abs(hot - ambient)
     return Noise(
         channel_sd=np.array([white.get(name, loss_noise[0]) for name in piece.channels]),
         floor_sd=np.array([LOWEST_SD_W if is_total_loss(name) else LOWEST_SD_K for name in piece.channels]),
         loss_relative_sd=loss_noise[1],
         heat_sd=heat_sd,
         heat_time=HEAT_TIME_S,
-        start_sd=np.where(known, START_KNOWN_K, unknown),
+        start=start_covariance(model, piece),
         wander=WANDER,
         capacity=float(capacities.sum()) if parametric else 0.0,
     )
@@ -126,20 +120,3 @@ def _conductances(model: NetworkOnGrid, piece: Piece) -> Array:
     memory = np.zeros((len(T), len(model.network.states)))
     each = model.conductances(model.signals(piece, T, model.start, memory), model.start, (len(T),))
     return np.asarray(each.mean(axis=0) @ np.abs(model.to_parts))
-
-
-def start_guess(model: NetworkOnGrid, piece: Piece) -> Array:
-    """Start temperatures of all parts: as measured, else the mean of what is, [degC]."""
-    first: dict[str, float] = {}
-    for index, name in enumerate(piece.channels):
-        seen = piece.measured[:, index]
-        seen = seen[np.isfinite(seen)]
-        if not is_total_loss(name) and len(seen):
-            first.setdefault(node_of_channel(name, model.parts), float(seen[0]))
-    middle = float(np.mean(list(first.values()))) if first else _ambient(model, piece)
-    return np.array([first.get(name, middle) for name in model.parts])
-
-
-def _ambient(model: NetworkOnGrid, piece: Piece) -> float:
-    inputs = model.laws.inputs
-    return float(piece.inputs[0, inputs.index("T_ambient")]) if "T_ambient" in inputs else 20.0

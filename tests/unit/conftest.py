@@ -11,7 +11,8 @@ from diagnosis.engine.prepare import usual_unknowns
 from diagnosis.forward.grid import Piece, pieces
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.recordings.recording import Recording
-from diagnosis.setup.noise import noise_of, start_guess
+from diagnosis.setup.noise import noise_of
+from diagnosis.setup.start import start_guess
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 from models.files.cycle import Cycle

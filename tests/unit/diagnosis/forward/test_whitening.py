@@ -43,7 +43,7 @@ def test_innovations_of_the_noise_are_white(
         heat[k] = heat_sd[k, :, None] * now[:-1] + draught * from_air[k, :, None] * now[-1]
         rho = np.exp(-h / noise.heat_time)
         now = rho * now + np.sqrt(1.0 - rho**2) * rng.normal(size=now.shape)
-    T = part.trajectory.response(heat, noise.start_sd[:, None] * rng.normal(size=(model.n, draws)))
+    T = part.trajectory.response(heat, np.linalg.cholesky(noise.start) @ rng.normal(size=(model.n, draws)))
     names = list(model.parts)
     rows = [T[:, names.index(n)] for n in CHANNELS[:3]]
     middle = 0.5 * (T[1:] + T[:-1])
@@ -70,7 +70,7 @@ def test_missing_readings_show_nothing(piece: Piece, experiment: Experiment) -> 
 def test_noise_needs_no_floor(model: NetworkOnGrid, experiment: Experiment) -> None:
     quiet = Noise(
         channel_sd=np.full(4, 0.1), floor_sd=np.zeros(4), loss_relative_sd=0.01, heat_sd=np.zeros(model.n),
-        heat_time=100.0, start_sd=np.ones(model.n),
+        heat_time=100.0, start=np.eye(model.n),
     )  # fmt: skip
     part = experiment.point(0, np.zeros(len(experiment.unknowns)))
     white = Whitening(model, part.trajectory, part.sensors, quiet)(part.residual[:, :, None])
