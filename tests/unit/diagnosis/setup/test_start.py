@@ -43,7 +43,8 @@ def test_a_cold_machine_is_known_better_in_differences_than_as_a_whole(model: Ne
     covariance = start_covariance(model, one)
     difference = np.zeros(model.n)
     difference[:2] = 1.0, -1.0
-    assert spread(covariance, difference) == pytest.approx(0.5 * np.sqrt(2.0))
+    above_air = 22.3 - piece.inputs[0, model.laws.inputs.index("T_ambient")]
+    assert spread(covariance, difference) == pytest.approx(np.sqrt(2.0) * (0.3 + 0.1 * above_air))
     assert spread(covariance, np.full(model.n, 1.0 / model.n)) == pytest.approx(2.0, rel=0.01)
 
 
