@@ -9,8 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import block_diag
-from scipy.linalg import solve_triangular
+from scipy.linalg import block_diag, solve_triangular
 
 from diagnosis.engine.fit import NOISE_ALONE, Experiment, Fit, Linear
 from diagnosis.engine.point import Setting

@@ -21,9 +21,9 @@ from diagnosis.engine.unknown import (
 from diagnosis.forward.grid import slow_rows
 from diagnosis.recordings.recording import Recording
 from diagnosis.setup.inference_setup import InferenceSetup, prepare
-from diagnosis.setup.start import start_guess
 from diagnosis.setup.sessions import session_by_recording, start_times
 from diagnosis.setup.shaft import torque_gain
+from diagnosis.setup.start import start_guess
 from models.assembly.gearbox import Gearbox
 from models.mechanisms import CATALOGUE, Mechanism
 from models.network.laws import Parameter

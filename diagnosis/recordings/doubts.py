@@ -10,6 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from diagnosis.recordings.cleaning import rows_text
+from diagnosis.recordings.cold_start import AGREE_K, is_isothermal
 from diagnosis.recordings.machine import RecordedMachine
 from diagnosis.recordings.rows import RecordedRows
 from models.base.types import Array
@@ -35,8 +36,8 @@ def doubts(found: RecordedRows, network: RecordedMachine) -> list[str]:
     found : RecordedRows
         In the units inside, impossible values and outliers taken out
     """
-    return [*_time_in_another_unit(found, network), *_hot(found, network), *_colder_than_ambient(found, network),
-            *_loss_and_power(found), *_far_rows(found, network)]  # fmt: skip
+    return [*_time_in_another_unit(found, network), *_hot(found, network), *_off_when_cold(found, network),
+            *_colder_than_ambient(found, network), *_loss_and_power(found), *_far_rows(found, network)]  # fmt: skip
 
 
 def _temperatures(found: RecordedRows, network: RecordedMachine) -> dict[str, Array]:
@@ -76,6 +77,22 @@ def _hot(found: RecordedRows, network: RecordedMachine) -> Iterator[str]:
             f"all temperatures begin at {min(firsts):.0f} to {max(firsts):.0f} degC, alike as in a machine that has "
             f"cooled down, but hot for one; {advice}"
         )
+
+
+def _off_when_cold(found: RecordedRows, network: RecordedMachine) -> Iterator[str]:
+    ambient = found.values.get("T_ambient", np.zeros(0))
+    firsts = {quantity: float(values[np.isfinite(values)][0])
+              for quantity, values in _temperatures(found, network).items()}  # fmt: skip
+    if not np.isfinite(ambient).any() or not is_isothermal([*firsts.values()], float(ambient[np.isfinite(ambient)][0])):
+        return
+    middle = float(np.median([*firsts.values()]))
+    for quantity, first in firsts.items():
+        if abs(first - middle) > AGREE_K:
+            yield (
+                f"{found.names[quantity]} begins {abs(first - middle):.1f} K {'above' if first > middle else 'below'} "
+                "the other thermometers, which agree as in a machine that has stood still: if it is wrong, state its "
+                "tolerance in a mapping (bias_sd)"
+            )
 
 
 def _colder_than_ambient(found: RecordedRows, network: RecordedMachine) -> Iterator[str]:

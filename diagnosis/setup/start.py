@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
 from diagnosis.forward.grid import Piece
 from diagnosis.forward.network_on_grid import NetworkOnGrid
+from diagnosis.recordings.cold_start import is_isothermal
 from models.base.types import Array
 from models.quantities.quantities import is_total_loss, node_of_channel
 
 MEASURED_K, UNMEASURED_K, UNMEASURED_SHARE = 2.0, 2.0, 0.15
 # A machine that stood still has one temperature, up to a share of what it is above the air. On 8 machines of a stranger
-# and the zoo that has 7 to 35 nat more evidence than starts that follow the thermometers; 0.2 K has 1 to 2 nat more yet,
-# but plants of paper start more evenly than those of steel.
-COLD_K, AGREE_K, FAULTY_K, ISOTHERMAL_K, ISOTHERMAL_SHARE = 8.0, 1.5, 10.0, 0.3, 0.1
+# 0.5 K has 7 to 32 nat more evidence than starts that follow the thermometers, and 0.2 to 0.3 K some nat more yet; but
+# simulated plants start more evenly than real ones.
+ISOTHERMAL_K, ISOTHERMAL_SHARE = 0.3, 0.1
 
 
 def start_guess(model: NetworkOnGrid, piece: Piece) -> Array:
@@ -35,14 +36,6 @@ def start_covariance(model: NetworkOnGrid, piece: Piece) -> Array:
         return np.asarray(apart**2 * np.eye(model.n) + MEASURED_K**2)
     unmeasured = UNMEASURED_K + UNMEASURED_SHARE * abs(max(first.values(), default=50.0) - ambient)
     return np.diag([(MEASURED_K if name in first else unmeasured) ** 2 for name in model.parts])
-
-
-def is_isothermal(readings: Sequence[float], ambient: float) -> bool:
-    """True if a cold machine has one temperature: its readings agree, of four or more all but one that may be wrong."""
-    if len(readings) < 2 or abs(np.median(readings) - ambient) > COLD_K:
-        return False
-    apart = np.sort(np.abs(np.asarray(readings) - np.median(readings)))
-    return bool(apart[-1] < AGREE_K or (len(apart) > 3 and apart[-2] < AGREE_K and apart[-1] < FAULTY_K))
 
 
 def _first_readings(model: NetworkOnGrid, piece: Piece) -> Mapping[str, float]:

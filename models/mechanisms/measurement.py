@@ -11,7 +11,7 @@ from models.terms.term import Form
 
 FAMILY = "measurement"
 EXCHANGE = "exchange the sensor with another one and repeat: a fault of the sensor goes with it"
-EQUAL_TEMPERATURE = "let all stand until it is at one temperature: all sensors must agree"
+EQUAL_TEMPERATURE = "hold a second thermometer next to it, or let all stand for a night: all must agree then"
 
 
 def _sensor(
@@ -53,7 +53,7 @@ sensor_drift = _sensor(
     law=lambda s: s.strength * s.x,
     says="The reading of the sensor at {place} drifts away in the course of the recording.",
     reference="ageing thermocouple or loosening contact",
-    experiment=EQUAL_TEMPERATURE + ", before and after the test",
+    experiment=EQUAL_TEMPERATURE + ", before and after a test",
 )
 
 sensor_gain = _sensor(

@@ -26,8 +26,8 @@ from diagnosis.proof.zoo.simulate import simulate
 from diagnosis.proof.zoo.structure import Variant, ZooPlant
 from diagnosis.recordings.recording import Channel, Recording
 from diagnosis.setup.noise import noise_of
-from diagnosis.setup.start import start_guess
 from diagnosis.setup.shaft import shafts, torque_gain, with_shaft
+from diagnosis.setup.start import start_guess
 from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.errors import InputError
 from models.base.types import Array

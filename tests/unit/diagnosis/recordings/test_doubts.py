@@ -32,6 +32,12 @@ def in_degF(source: pd.DataFrame) -> pd.DataFrame:
     return source.assign(**{name: source[name] * 1.8 + 32.0 for name in source if str(name).endswith("degC")})
 
 
+def with_thermometer(first: float) -> pd.DataFrame:
+    """With two more thermometers, of which one begins at a given temperature."""
+    source = table()
+    return source.assign(T_bearing_1_degC=source["T_oil_degC"], T_bearing_2_degC=source["T_oil_degC"] - 22.0 + first)
+
+
 SWAPPED = {"T_oil_degC": "T_ambient_degC", "T_ambient_degC": "T_oil_degC"}
 DOUBTS: dict[str, tuple[pd.DataFrame, str]] = {
     "degF": (in_degF(table()), "T_ambient_degC: 72 degC on average is hot for ambient air"),
@@ -43,6 +49,7 @@ DOUBTS: dict[str, tuple[pd.DataFrame, str]] = {
                        "P_loss_W is 300 W on average, but speed_rpm and torque_Nm give 14.8 W"),
     "loss in kW": (table().assign(P_loss_W=0.3),
                    "P_loss_W is 0.3 W on average, but speed_rpm and torque_Nm give 1.48e+04 W"),
+    "a wrong thermometer": (with_thermometer(25.0), "T_bearing_2_degC begins 2.5 K above the other thermometers"),
     "minutes": (table().assign(time_s=TIME / 60.0), "time_s goes over 66.5 s, in which T_oil_degC moves by"),
     "hours": (table().assign(time_s=TIME / 3600.0), "if it counts minutes or hours, name its unit in a mapping"),
     "milliseconds": (table().assign(time_s=1e3 * NUMBERS), "if it counts milliseconds"),
@@ -62,6 +69,7 @@ def test_a_doubt_is_the_first_note(tmp_path: Path, fzg: Gearbox, case: str) -> N
     table().assign(time_s=600.0 * NUMBERS),  # of a plant's records
     table().assign(T_oil_degC=80.0, T_pinion_degC=110.0).drop(columns="T_ambient_degC"),  # begun at work
     table().assign(T_oil_degC=51.0 + NUMBERS / 100.0, T_pinion_degC=52.0 + NUMBERS / 100.0),  # begun warm, in cool air
+    with_thermometer(23.0), with_thermometer(45.0),  # 1 K off; preheated
     table().assign(torque_Nm=1.0), table().assign(torque_Nm=0.0),  # without load
 ])  # fmt: skip
 def test_a_sound_recording_raises_none(tmp_path: Path, fzg: Gearbox, source: pd.DataFrame) -> None:

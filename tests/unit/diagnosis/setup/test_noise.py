@@ -31,7 +31,8 @@ def test_watts_are_no_start_temperature(model: NetworkOnGrid, piece: Piece) -> N
     watts, hot = np.array(piece.measured), np.array(piece.measured)
     watts[0, CHANNELS.index("P_loss")] = 700.0
     hot[0, CHANNELS.index("oil")] = 92.0
-    covariances = [noise_of(model, replace(piece, measured=m), white, 250.0).start for m in (piece.measured, watts, hot)]
+    given = [replace(piece, measured=one) for one in (piece.measured, watts, hot)]
+    covariances = [noise_of(model, one, white, 250.0).start for one in given]
     sd = [np.sqrt(np.diag(one)) for one in covariances]
     np.testing.assert_array_equal(covariances[1], covariances[0])
     unknown = [index for index, name in enumerate(model.parts) if name not in CHANNELS]

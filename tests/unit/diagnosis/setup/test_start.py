@@ -9,7 +9,8 @@ import pytest
 
 from diagnosis.forward.grid import Piece
 from diagnosis.forward.network_on_grid import NetworkOnGrid
-from diagnosis.setup.start import is_isothermal, start_covariance, start_guess
+from diagnosis.recordings.cold_start import is_isothermal
+from diagnosis.setup.start import start_covariance, start_guess
 from models.base.types import Array
 from tests.unit.diagnosis.inference_example import CHANNELS
 
