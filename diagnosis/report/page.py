@@ -13,9 +13,9 @@ from markupsafe import Markup
 from diagnosis.report import course_charts, equation, finding_charts, network_chart, wording
 from diagnosis.report.chart import Chart
 from diagnosis.results import number_format as numbers
-from diagnosis.results.first_screen import ahead_in, date_told, size_of, values_told
+from diagnosis.results.first_screen import date_told, size_of, values_told
 from diagnosis.results.result import Diagnosis
-from diagnosis.results.result_parts import NO_CLAIM, Calibrated, Errors, Finding, Fits, error_unit, title_of
+from diagnosis.results.result_parts import NO_CLAIM, Calibrated, Errors, Finding, Fits, error_unit, named, title_of
 
 PACKAGE = "diagnosis.report"
 PLOTLY = "plotly-basic.min.js"  # npm: plotly.js-basic-dist-min, of the version that the plotly of Python brings
@@ -61,7 +61,7 @@ def page(diagnosis: Diagnosis) -> str:
         windows=wording.windows,
         headline=wording.headline,
         size_of=size_of,
-        ahead_in=ahead_in,
+        named=named,
         recordings=len({course.recording for course in diagnosis.courses}),
         provenance=wording.provenance(diagnosis.inputs),
     )  # fmt: skip

@@ -353,11 +353,6 @@ def size_of(one: ScaledError) -> str:
     return SIZES[one.factor]
 
 
-def ahead_in(one: ScaledError) -> str:
-    """The candidate ahead, or that nothing stands out."""
-    return named(one.mechanism, one.place) if one.log_e_value > one.threshold else "nothing"
-
-
 def repeating_told(supported: Repeating, worse: Repeating) -> str:
     """Sentence on what the scan would say if the machine repeated worse.
 
@@ -380,16 +375,14 @@ def robustness_told(every: Sequence[ScaledError]) -> str:
 
     Examples
     --------
-    >>> from dataclasses import replace
     >>> one = ScaledError(factor=0.5, log_e_value=40.2, threshold=5.0, mechanism="windage", place="oil")
-    >>> robustness_told([one, replace(one, factor=2.0, log_e_value=31.0)])
-    'Quick scan (before fits) with model error half as large 40 nat, twice as large 31 nat: windage at oil ahead.'
-    >>> robustness_told([one, replace(one, factor=2.0, log_e_value=3.0)])
-    'Quick scan (before fits) with model error half as large 40 nat (windage at oil), twice as large 3 nat (nothing).'
+    >>> robustness_told([one])
+    'Quick scan (before fits) with model error half as large 40 nat (5 needed): windage at oil ahead.'
     """
-    ahead = {ahead_in(one) for one in every}
+    names = [f"{named(one.mechanism, one.place)} ahead" for one in every]
+    together = names[0] if len(set(names)) == 1 else ""
     told = [
-        f"{size_of(one)} {one.log_e_value:.0f} nat{f' ({ahead_in(one)})' if len(ahead) > 1 else ''}" for one in every
+        f"{size_of(one)} {one.log_e_value:.0f} nat ({one.threshold:.0f} needed{'' if together else f'; {name}'})"
+        for one, name in zip(every, names, strict=True)
     ]
-    together = f": {ahead.pop()} ahead" if len(ahead) == 1 else ""
-    return f"Quick scan (before fits) with model error {', '.join(told)}{together}."
+    return f"Quick scan (before fits) with model error {', '.join(told)}{f': {together}' if together else ''}."

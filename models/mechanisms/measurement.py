@@ -11,7 +11,7 @@ from models.terms.term import Form
 
 FAMILY = "measurement"
 EXCHANGE = "exchange the sensor with another one and repeat: a fault of the sensor goes with it"
-EQUAL_TEMPERATURE = "hold a second thermometer next to it, or let all stand for a night: all must agree then"
+EQUAL_TEMPERATURE = "hold a second thermometer next to it, or let all rest for a night: all must agree then"
 
 
 def _sensor(

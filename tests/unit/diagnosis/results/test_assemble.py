@@ -11,7 +11,7 @@ import pytest
 
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.answer import Answer
-from diagnosis.decision.posterior import Assumed, Expected, Judged, Placebo
+from diagnosis.decision.posterior import Assumed, Expected, Judged, Placebo, Posterior
 from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.families import candidates_of
 from diagnosis.engine.fit import Experiment, Fit
@@ -370,8 +370,13 @@ def test_a_parameter(assembled: Assemble, prepared: Prepared) -> None:
     assert claim.sign == -1 and "air" in claim.nodes
 
 
-def test_a_sensor_fault(assembled: Assemble, prepared: Prepared, windage: Judged, fzg: Gearbox) -> None:
-    setup, _, plain = prepared
+def test_a_sensor_fault(prepared: Prepared, calibration: Calibration, windage: Judged, fzg: Gearbox) -> None:
+    setup, experiment, plain = prepared
+    alike = replace(setup, holdout=setup.recordings, held_out=setup.learnt)  # others would contradict this fault
+
+    def assembled(posterior: Posterior, answers: list[Answer]) -> Diagnosis:
+        return assemble(alike, experiment, posterior, answers, plain=plain, calibration=calibration)
+
     effect = replace(effect_of(setup, plain, "sensor_bias", "oil"), log_prior=-3.0)
     assert effect.term is not None
     fit = _fit_with(plain, effect, {effect.term.strength.name: 3.0})
