@@ -6,12 +6,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-COLD_K, AGREE_K, FAULTY_K = 8.0, 1.5, 10.0
+COLD_K, AGREE_K = 8.0, 1.5
+AT_REST_K, FAULTY_K = 1.0, 5.0
 
 
 def is_isothermal(readings: Sequence[float], ambient: float) -> bool:
-    """True if a cold machine has one temperature: its readings agree, of four or more all but one that may be wrong."""
-    if len(readings) < 2 or abs(np.median(readings) - ambient) > COLD_K:
+    """True if a cold machine has one temperature: its readings agree.
+
+    Of four and more one may be off if the others are as cold as the air: it is wrong then. In a machine that cools
+    down, parts differ by a share of what they are above the air, and oil that is preheated is warmer by more.
+    """
+    if len(readings) < 2 or (rise := abs(np.median(readings) - ambient)) > COLD_K:
         return False
     apart = np.sort(np.abs(np.asarray(readings) - np.median(readings)))
-    return bool(apart[-1] < AGREE_K or (len(apart) > 3 and apart[-2] < AGREE_K and apart[-1] < FAULTY_K))
+    one_is_wrong = len(apart) > 3 and apart[-2] < AGREE_K and apart[-1] < FAULTY_K and rise < AT_REST_K
+    return bool(apart[-1] < AGREE_K or one_is_wrong)

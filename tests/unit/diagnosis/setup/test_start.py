@@ -23,7 +23,8 @@ def spread(covariance: Array, of: Array) -> float:
 @pytest.mark.parametrize(
     ("readings", "expected"),
     [
-        pytest.param([21.0, 21.4, 20.8, 24.0], True, id="one thermometer of four is off"),
+        pytest.param([20.5, 20.9, 20.3, 24.0], True, id="one thermometer of four is off"),
+        pytest.param([21.5, 21.9, 21.8, 25.0], False, id="oil that cools down last"),
         pytest.param([21.0, 21.4, 24.0], False, id="of three it may be the machine"),
         pytest.param([21.0, 21.4], True, id="two that agree"),
         pytest.param([21.0], False, id="one alone"),
