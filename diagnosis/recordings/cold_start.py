@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-COLD_K, AGREE_K = 8.0, 1.5
-AT_REST_K, FAULTY_K = 1.0, 5.0
+# Chosen by hand, not fitted.
+COLD_K, AGREE_K = 8.0, 1.5  # above the air; of a reading from the median
+AT_REST_K, FAULTY_K = 1.0, 5.0  # above the air and from the median, at most, where one thermometer is wrong
 
 
 def is_isothermal(readings: Sequence[float], ambient: float) -> bool:
@@ -15,6 +16,13 @@ def is_isothermal(readings: Sequence[float], ambient: float) -> bool:
 
     Of four and more one may be off if the others are as cold as the air: it is wrong then. In a machine that cools
     down, parts differ by a share of what they are above the air, and oil that is preheated is warmer by more.
+
+    Parameters
+    ----------
+    readings : sequence of float
+        First temperatures of all parts that are measured, [degC]
+    ambient : float
+        Of the air then, [degC]
     """
     if len(readings) < 2 or (rise := abs(np.median(readings) - ambient)) > COLD_K:
         return False

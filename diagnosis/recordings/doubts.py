@@ -45,6 +45,11 @@ def _temperatures(found: RecordedRows, network: RecordedMachine) -> dict[str, Ar
     return {quantity: values for quantity, values in measured.items() if np.isfinite(values).any()}
 
 
+def _firsts(found: RecordedRows, network: RecordedMachine) -> dict[str, float]:
+    measured = _temperatures(found, network)
+    return {quantity: float(values[np.isfinite(values)][0]) for quantity, values in measured.items()}
+
+
 def _time_in_another_unit(found: RecordedRows, network: RecordedMachine) -> Iterator[str]:
     if found.clock is None or found.clock.is_date:
         return
@@ -71,7 +76,7 @@ def _hot(found: RecordedRows, network: RecordedMachine) -> Iterator[str]:
         yield f"{name}: {np.nanmean(ambient):.0f} degC on average is hot for ambient air; {advice}"
     if "T_ambient" in found.names:  # in another unit it would be hot as well
         return
-    firsts = [values[np.isfinite(values)][0] for values in _temperatures(found, network).values()]
+    firsts = _firsts(found, network).values()
     if len(firsts) > 1 and min(firsts) > HOT_AIR and max(firsts) - min(firsts) < COLD_START_K:
         yield (
             f"all temperatures begin at {min(firsts):.0f} to {max(firsts):.0f} degC, alike as in a machine that has "
@@ -81,8 +86,7 @@ def _hot(found: RecordedRows, network: RecordedMachine) -> Iterator[str]:
 
 def _off_when_cold(found: RecordedRows, network: RecordedMachine) -> Iterator[str]:
     ambient = found.values.get("T_ambient", np.zeros(0))
-    firsts = {quantity: float(values[np.isfinite(values)][0])
-              for quantity, values in _temperatures(found, network).items()}  # fmt: skip
+    firsts = _firsts(found, network)
     if not np.isfinite(ambient).any() or not is_isothermal([*firsts.values()], float(ambient[np.isfinite(ambient)][0])):
         return
     middle = float(np.median([*firsts.values()]))

@@ -12,7 +12,7 @@ from diagnosis.recordings.cold_start import is_isothermal
 from models.base.types import Array
 from models.quantities.quantities import is_total_loss, node_of_channel
 
-MEASURED_K, UNMEASURED_K, UNMEASURED_SHARE = 2.0, 2.0, 0.15
+MEASURED_K, UNMEASURED_K, UNMEASURED_SHARE = 2.0, 2.0, 0.15  # the share is of what the hottest is above the air
 # A machine that stood still has one temperature, up to a share of what it is above the air. On 8 machines of a stranger
 # 0.5 K has 7 to 32 nat more evidence than starts that follow the thermometers, and 0.2 to 0.3 K some nat more yet; but
 # simulated plants start more evenly than real ones.
@@ -20,7 +20,7 @@ ISOTHERMAL_K, ISOTHERMAL_SHARE = 0.3, 0.1
 
 
 def start_guess(model: NetworkOnGrid, piece: Piece) -> Array:
-    """Start temperatures of all parts, [degC]: that of most if they agree; else as measured, or the mean of what is."""
+    """Start temperatures, shape (parts,), [degC]: the median if all agree; else as measured, or the mean of what is."""
     first, ambient = _first_readings(model, piece), _ambient(model, piece)
     if is_isothermal([*first.values()], ambient):
         return np.full(model.n, float(np.median([*first.values()])))

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.decision.posterior import Assumed, Placebo
+from diagnosis.decision.posterior import Assumed, Placebo, ScaledError
 from diagnosis.decision.settings import Settings
 from diagnosis.report import finding_charts
 from diagnosis.report.page import page
@@ -42,6 +42,17 @@ def test_where_little_could_be_seen_the_summary_states_how_much_could_hide_and_t
     line = "Not decided: 30 effects could hide that change a temperature by 4 K (--matters-K)"
     asked = replace(insufficient_data(), settings=Settings(matters_K=4.0))
     assert told(asked, "Is something missing?").startswith(line)
+
+
+def test_what_each_size_of_model_error_needs_stands_with_the_evidence() -> None:
+    half = ScaledError(factor=0.5, log_e_value=31.4, threshold=40.0, mechanism="windage", place="oil")
+    as_assumed = replace(half, factor=1.0, log_e_value=29.2, threshold=10.0)
+    one_name = replace(missing_physics(), assumed=Assumed(scaled_error=(half, as_assumed)))
+    sure = told(one_name, "How sure?")
+    assert "half as large 31 nat (40 needed), as assumed 29 nat (10 needed): windage at oil ahead." in sure
+    two_names = (half, replace(as_assumed, mechanism="pocketing", place="mesh"))
+    sure = told(replace(one_name, assumed=Assumed(scaled_error=two_names)), "How sure?")
+    assert "31 nat (40 needed; windage at oil ahead), as assumed 29 nat (10 needed; pocketing at mesh ahead)." in sure
 
 
 def test_a_baseline_that_raises_the_threshold_is_told_with_it() -> None:

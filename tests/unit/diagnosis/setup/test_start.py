@@ -25,11 +25,11 @@ def spread(covariance: Array, of: Array) -> float:
     [
         pytest.param([20.5, 20.9, 20.3, 24.0], True, id="one thermometer of four is off"),
         pytest.param([21.5, 21.9, 21.8, 25.0], False, id="oil that cools down last"),
-        pytest.param([21.0, 21.4, 24.0], False, id="of three it may be the machine"),
+        pytest.param([20.2, 20.6, 24.0], False, id="of three it may be the machine"),
         pytest.param([21.0, 21.4], True, id="two that agree"),
         pytest.param([21.0], False, id="one alone"),
-        pytest.param([21.0, 21.4, 20.8, 35.0], False, id="a preheated part"),
-        pytest.param([21.0, 24.0, 20.8, 24.0], False, id="two are off"),
+        pytest.param([20.2, 20.6, 20.0, 26.0], False, id="a preheated part"),
+        pytest.param([20.0, 20.2, 23.0, 17.0], False, id="two are off"),
         pytest.param([50.0, 50.5, 50.2, 50.1], False, id="in operation"),
     ],
 )
