@@ -20,7 +20,7 @@ from models.assembly.gearbox import load_gearbox
 from models.assembly.gearbox_definition import Definition
 from models.correction.correction import Correction
 from models.definition.key_texts import TEXTS, KeyText
-from models.definition.known_bearings import known_bearings
+from models.definition.known_bearings import known_series
 from models.definition.named_oils import known_oils, lubricant, named_oil, read_oil
 from models.definition.parametric_sections import ParametricDefinition
 from models.definition.values_with_source import Annotations, strip
@@ -244,7 +244,7 @@ def oils() -> Iterator[str]:
 
 def bearings() -> Iterator[str]:
     """Bearings that a definition may name."""
-    yield ", ".join(f"`{name}`" for name in known_bearings())
+    yield from _table(("type", "series", "known"), known_series())
 
 
 def variables() -> Iterator[str]:

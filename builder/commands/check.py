@@ -12,7 +12,7 @@ from builder.base.progress import LOADING, progress
 from models.assembly.gearbox import known_gearboxes, load_gearbox
 from models.base.atomic_write import atomic_file
 from models.base.errors import InputError
-from models.definition.known_bearings import known_bearings
+from models.definition.known_bearings import known_series
 from models.definition.named_oils import known_oils, named_oil
 from models.files.output_files import refuse_to_replace
 from models.files.toml_file import names_a_file
@@ -25,7 +25,8 @@ def _show_known(context: click.Context, _: click.Parameter, asked: bool) -> None
     if asked:
         oils = [[name, named_oil(name).name] for name in known_oils()]
         console.table("Oils: [oil] named = ...", ["name", "oil"], oils, text_columns=2)
-        console.table("Bearings: [[bearing]] designation = ...", ["name"], [[name] for name in known_bearings()])
+        bearings = [[*row] for row in known_series()]
+        console.table("Bearings: [[bearing]] designation = ...", ["type", "series", "known"], bearings, text_columns=3)
         console.table("Machines: --gearbox, new --like", ["name", "machine"],
                       [[name, load_gearbox(name).name] for name in known_gearboxes()], text_columns=2)  # fmt: skip
         context.exit()

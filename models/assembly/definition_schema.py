@@ -11,12 +11,13 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from models.assembly.gearbox_definition import FACTORS, Definition
+from models.definition.bearing_section import Bearing
 from models.definition.definition_file import LIKE_KEYS
 from models.definition.key_texts import TEXTS
-from models.definition.known_bearings import LAW, NEEDED, known_bearings
+from models.definition.known_bearings import FILLED, known_bearings
 from models.definition.named_oils import known_oils
 from models.definition.parametric_sections import KEY, ParametricDefinition
-from models.definition.sections import Bearing, Oil
+from models.definition.sections import Oil
 from models.definition.values_with_source import join
 from models.quantities.definition_units import unit_of
 
@@ -156,7 +157,7 @@ def _requirement(name: str, required: list[str]) -> Schema:
         own = [key for key in ("level_below_axis_mm", "volume_l") if key in required]
         return {"required": own, "anyOf": [{"required": ["named"]}, {"required": required}]}
     if name == Bearing.__name__:
-        known = [key for key in required if key not in (*NEEDED, *LAW)]
+        known = [key for key in required if key not in FILLED]
         return {"anyOf": [{"required": ["name", "like"]}, {"required": known}]}
     if name.lower() in LIKE_KEYS:
         return {"anyOf": [{"required": ["name", "like"]}, {"required": required}]}

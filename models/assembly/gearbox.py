@@ -25,11 +25,12 @@ from models.assembly.parametric import (
     with_losses_as_laws,
 )
 from models.base.errors import InputError, did_you_mean
+from models.definition.bearing_section import Bearing
 from models.definition.definition_file import fault_lines, placed, read_values, refilled, refuse
 from models.definition.messages import validate_section
 from models.definition.nested_values import leaves_of, plain, with_value
 from models.definition.parametric_sections import KEY, ParametricDefinition
-from models.definition.sections import Ambient, Bearing, Housing, Oil, Seal, Shaft, Stage, Training
+from models.definition.sections import Ambient, Housing, Oil, Seal, Shaft, Stage, Training
 from models.definition.values_with_source import Annotations
 from models.files.cycle import Cycle
 from models.files.toml_file import known_names, names_a_file, packaged, read_text

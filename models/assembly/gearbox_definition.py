@@ -10,10 +10,10 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from models.base.errors import did_you_mean
+from models.definition.bearing_section import Bearing
 from models.definition.named_oils import lubricant
 from models.definition.sections import (
     Ambient,
-    Bearing,
     Housing,
     Node,
     Oil,

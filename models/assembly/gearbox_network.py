@@ -14,7 +14,8 @@ import numpy as np
 import sympy as sp
 
 from models.assembly.gearbox_definition import Definition
-from models.definition.sections import Bearing, Shaft
+from models.definition.bearing_section import Bearing
+from models.definition.sections import Shaft
 from models.formulas import heat_transfer as ht
 from models.formulas.ehl import reduced_modulus
 from models.formulas.extremes import Max, Min

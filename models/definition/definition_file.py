@@ -6,7 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
 from models.base.errors import InputError, did_you_mean, shown
-from models.definition.known_bearings import NEEDED, filled_by_designation
+from models.definition.bearing_section import OF_TYPE
+from models.definition.known_bearings import FILLED, filled_by_designation
 from models.definition.messages import place_in
 from models.definition.named_oils import read_oil
 from models.definition.nested_values import with_value
@@ -81,10 +82,13 @@ def refilled(values: Mapping[str, Any], path: str, notes: Annotations) -> tuple[
         return {**values, "oil": _filled_from_named_oil(own, notes), "seal": seals}, table
     if table.startswith("bearing.") and key == "designation":
         bearing = values["bearing"][int(table.removeprefix("bearing."))]
-        own = {key: value for key, value in bearing.items() if key not in NEEDED}
-        for needed in NEEDED:
-            _forget(notes, f"{table}.{needed}")
-        return with_value(values, table.split("."), filled_by_designation(own, notes, table)), table
+        own = {key: value for key, value in bearing.items() if key not in FILLED}
+        for key in FILLED:
+            _forget(notes, f"{table}.{key}")
+        filled = filled_by_designation(own, notes, table)
+        if filled.get("type") != bearing["type"]:  # its constants are those of the other type
+            filled = {key: value for key, value in filled.items() if key not in OF_TYPE[bearing["type"]]}
+        return with_value(values, table.split("."), filled), table
     return values, path
 
 

@@ -6,23 +6,28 @@ import re
 from functools import cache
 from typing import Any
 
-from models.definition.values_with_source import Annotations, strip
+from models.definition.bearing_section import OF_TYPE, SLIDING_OF_TYPE
+from models.definition.values_with_source import Annotations
 from models.files.toml_file import packaged, parse, read_text
 
-FOLDER, FILE = "bearings", "cylindrical_roller"
-LAW = {"type": "cylindrical_roller", "model": "skf"}  # of all of them
-DESIGNATION = re.compile(r"\s*(NU)\s*(\d{3,4})(?!\d)")  # suffixes of cage and design do not count
-NEEDED = ("bore_mm", "outside_diameter_mm", "width_mm", "mass_kg", "R1", "S2")
+FOLDER, FILE = "bearings", "known"
+# Suffixes of cage and design do not count; the friction of a seal in the bearing (RS) is not modelled.
+# Under a radial load N, NJ and NUP have the constants of NU.
+DESIGNATION = re.compile(r"\s*(N|NJ|NU|NUP)?\s*(\d{3,4})(?!\d)(?!.*RS)")
+SIZES = ("bore_mm", "outside_diameter_mm", "width_mm", "mass_kg")
+FILLED = (*SIZES, "R1", "S1", "S2", "type", "model")  # what a designation gives
+UNCERTAIN, SD_SHARE = ("mass_kg", "R1", "S1", "S2"), 0.1  # the constants are those of a series, rounded
 
 
 @cache
-def _catalogue() -> dict[str, tuple[dict[str, Any], Annotations]]:
-    name = f"{FILE}.toml"
+def _catalogue() -> dict[str, tuple[dict[str, Any], str, str]]:
+    """Values by designation; series, and source of the mass."""
     found = {}
-    for table in parse(read_text(packaged(FOLDER, FILE)), file=name)["bearing"]:
-        notes = Annotations()
-        values = strip(table, notes)
-        found[values.pop("designation")] = values, notes
+    for series in parse(read_text(packaged(FOLDER, FILE)), file=f"{FILE}.toml")["series"]:
+        of_all = {key: series[key] for key in ("type", "R1", "S1", "S2") if key in series} | {"model": "skf"}
+        for name, sizes in series["sizes"].items():
+            values = dict(zip(SIZES, map(float, sizes), strict=True))
+            found[name] = values | of_all, series["name"], series["source"]
     return found
 
 
@@ -31,10 +36,24 @@ def known_bearings() -> tuple[str, ...]:
 
     Examples
     --------
-    >>> known_bearings()[0], "NU 406" in known_bearings()
+    >>> known_bearings()[0], "6208" in known_bearings()
     ('NU 204', True)
     """
     return tuple(_catalogue())
+
+
+def known_series() -> list[tuple[str, str, str]]:
+    """Return type, series and designations of what is known.
+
+    Examples
+    --------
+    >>> known_series()[2]
+    ('cylindrical roller', 'NU 22', '2205 to 2216')
+    """
+    series: dict[tuple[str, str], list[str]] = {}
+    for name, (values, of_series, _) in _catalogue().items():
+        series.setdefault((values["type"].replace("_", " "), of_series), []).append(name.split()[-1])
+    return [(kind, name, " to ".join(dict.fromkeys((all_[0], all_[-1])))) for (kind, name), all_ in series.items()]
 
 
 def filled_by_designation(own: dict[str, Any], notes: Annotations, path: str) -> dict[str, Any]:
@@ -59,25 +78,26 @@ def filled_by_designation(own: dict[str, Any], notes: Annotations, path: str) ->
     'typical: NU 207, ISO 15 and SKF friction model, series NU 2'
     """
     named = own.get("designation")
-    missing = [key for key in NEEDED if key not in own]
-    if not missing or not isinstance(named, str):
-        return own
-    match = DESIGNATION.match(named)
-    name = f"{match[1]} {match[2]}" if match else ""
-    if name not in _catalogue():
-        first, *_, last, other = known_bearings()
-        known = f"known are {first} to {last} and {other}"
+    match = DESIGNATION.match(named) if isinstance(named, str) else None
+    name = f"{'NU ' if match[1] else ''}{match[2]}" if match else ""
+    if name in _catalogue():
+        values, series, of_mass = _catalogue()[name]
+        filled = {key: value for key, value in values.items() if key not in own}
+        for key in filled:
+            of_key = of_mass if key == "mass_kg" else f"{name}, ISO 15 and SKF friction model, series {series}"
+            notes.sources[f"{path}.{key}"] = f"typical: {of_key}"
+            if key in UNCERTAIN:
+                notes.priors[f"{path}.{key}"] = SD_SHARE * filled[key]
+        return own | filled
+    missing = [key for key in (*SIZES, "R1", "type") if key not in own]
+    if not {*SLIDING_OF_TYPE.values()} & {*own}:
+        missing.append(SLIDING_OF_TYPE.get(str(own.get("type")), "S1 (balls) or S2 (rollers)"))
+    if missing and isinstance(named, str):
         text = (
-            f"sizes of {named!r} are not known; give {', '.join(missing)} ({known}). Bearings other than cylindrical "
-            "roller bearings are not supported: describe their machine without geometry, as "
+            f"sizes of {named!r} are not known; give {', '.join(missing)} (known are cylindrical roller bearings as "
+            "NU 207 and deep groove ball bearings as 6208, open: python -m builder check --known). Bearings of other "
+            f"types than {' and '.join(OF_TYPE)} are not supported: describe their machine without geometry, as "
             "python -m builder new FILE --like reducer does"
         )
         notes.faults.append((f"{path}.designation", text))
-        return own
-    values, its_notes = _catalogue()[name]
-    series = f"typical: {name}, ISO 15 and SKF friction model, series {name[:4]}"
-    for key in missing:
-        notes.sources[f"{path}.{key}"] = its_notes.source_of(key) or series
-        if key in its_notes.priors:
-            notes.priors[f"{path}.{key}"] = its_notes.priors[key]
-    return own | {key: value for key, value in LAW.items() if key not in own} | {key: values[key] for key in missing}
+    return own

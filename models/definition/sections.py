@@ -47,8 +47,6 @@ FluidTemperature = Annotated[float, between(-60.0, 250.0, unit="_degC")]
 Viscosity = Annotated[float, between(0.5, 1e5, unit="_mm2_s")]
 Coefficient = Annotated[float, between(1e-4, 0.5)]
 
-LARGEST_RING_RATIO = 5.0  # outside diameter over bore; the largest of ISO 15, from memory, is 4 (634: 16 over 4 mm)
-
 
 class Section(BaseModel):
     """One table of the file: strict, frozen, and without room for unknown keys."""
@@ -342,61 +340,6 @@ class Stage(Section):
         for name, bore, r_f in zip(self.names, self.bore_mm, self.pair().r_f, strict=True):
             if bore >= 2e3 * r_f:
                 raise ValueError(f"bore_mm of '{name}' is {bore:g}, not below its root diameter {2e3 * r_f:.4g} mm")
-        return self
-
-
-class Bearing(Section):
-    """``[[bearing]]``: one rolling bearing with the constants of the SKF friction model."""
-
-    name: Name
-    shaft: Name
-    designation: Text
-    type: Literal["cylindrical_roller"]
-    bore_mm: Annotated[float, between(1.0, 1000.0)]
-    outside_diameter_mm: Annotated[float, between(3.0, 2000.0)]
-    width_mm: Annotated[float, between(1.0, 500.0)]
-    mass_kg: Annotated[float, between(0.001, 1000.0)]
-    model: Literal["skf"]
-    R1: Annotated[float, between(1e-8, 1e-4)]
-    S2: Annotated[float, between(1e-5, 1.0)]
-    K_rs: Annotated[float, between(0.0, 1e-6)] = 3e-8
-    K_Z: Annotated[float, between(1.0, 10.0)] = 5.1
-    K_L: Annotated[float, between(0.1, 2.0)] = 0.65
-    mu_bl: Coefficient = 0.12
-    mu_EHL: Coefficient = 0.02
-    oil_level_mm: Annotated[float, between(0.0, 1000.0)] | None = None
-    temperature: Literal["mean", "skf_outlet"] = "mean"
-    load_share: Annotated[float, between(0.0, 1.0)]
-    drag: Literal["2016", "2008"] = "2016"
-    heat_dissipation_W_K: Annotated[float, between(0.001, 1000.0)] | None = None
-
-    def oil_level(self, level_below_axis_mm: float) -> float:
-        """Oil level above the lowest contact of the outer raceway, [mm]; ``0.6 d_m`` is that contact's radius (SKF).
-
-        Parameters
-        ----------
-        level_below_axis_mm : float
-            Oil level of the sump below the shaft axis, [mm]; read unless the file gives the bearing its own level
-
-        Returns
-        -------
-        float
-            Level H, [mm]; 0 where the bearing is dry
-        """
-        if self.oil_level_mm is not None:
-            return self.oil_level_mm
-        return max(0.0, 0.3 * (self.bore_mm + self.outside_diameter_mm) - level_below_axis_mm)
-
-    @model_validator(mode="after")
-    def _rings_are_possible(self) -> Self:
-        bore, outside = self.bore_mm, self.outside_diameter_mm
-        if outside <= bore:
-            raise ValueError(f"outside_diameter_mm = {outside:g} is not above bore_mm = {bore:g}")
-        if outside > LARGEST_RING_RATIO * bore:
-            raise ValueError(
-                f"outside_diameter_mm = {outside:g} is {outside / bore:.3g} times bore_mm = {bore:g}; rolling bearings "
-                f"have up to 4 times, above {LARGEST_RING_RATIO:g} is refused: correct one of them"
-            )
         return self
 
 

@@ -18,18 +18,27 @@ from models.formulas.oil import Oil
 from models.losses.loss_term import OIL, SPEED, TORQUE, GearboxData, LossKind, LossTerm, TermInput
 from models.portable.evaluation import RPM
 
-# SKF's drag factor of roller bearings over H/d_m: read off the catalogue's diagram (digitised by the public
-# re-implementation JRaposo-m/SKF-Bearing-Selection-Tool); constant beyond 1.2.
+# SKF's drag factor over H/d_m: read off the catalogue's diagram (digitised by the public re-implementation
+# JRaposo-m/SKF-Bearing-Selection-Tool); constant beyond the last. Of balls, the enlarged diagram up to 0.2.
 V_M_LEVEL = np.array([0, .0126, .0272, .0456, .0611, .0756, .0918, .110, .133, .156, .178, .20, .244, .315, .411, .489,
                       .552, .661, .759, .889, 1.04, 1.20])  # fmt: skip
 V_M_ROLLER = np.array([0, 7.3e-6, 1.8e-5, 3.45e-5, 5.33e-5, 7.38e-5, 1.02e-4, 1.36e-4, 1.88e-4, 2.42e-4, 2.97e-4,
                        3.1e-4, 3.78e-4, 4.7e-4, 5.83e-4, 6.72e-4, 7.33e-4, 8.46e-4, 9.42e-4, 1.08e-3, 1.24e-3,
                        1.434e-3])  # fmt: skip
+V_M_BALL_LEVEL = np.array([0, .0096, .0193, .0322, .0444, .0559, .0667, .0841, .1007, .1163, .1319, .1504, .1659, .1815,
+                           .2004, .2522, .2826, .3239, .3652, .4348, .50, .5978, .6609, .7239, .8087, .8674, .9391,
+                           1.002, 1.041, 1.104, 1.154, 1.183, 1.209])  # fmt: skip
+V_M_BALL = np.array([0, 1.62e-6, 6.10e-6, 1.06e-5, 1.50e-5, 2.23e-5, 3.14e-5, 5.13e-5, 7.41e-5, 9.81e-5, 1.24e-4,
+                     1.58e-4, 1.86e-4, 2.14e-4, 2.47e-4, 3.16e-4, 3.64e-4, 4.05e-4, 4.46e-4, 5.11e-4, 5.66e-4, 6.38e-4,
+                     6.75e-4, 7.20e-4, 7.85e-4, 8.36e-4, 9.01e-4, 9.49e-4, 9.79e-4, 1.05e-3, 1.13e-3, 1.22e-3,
+                     1.246e-3])  # fmt: skip
 # SKF gives the drag formula up to these viscosities (mm^2/s): bearing at most half in oil, and deeper.
 DRAG_NU_HALF, DRAG_NU_DEEP = 500.0, 250.0
 STARVATION_NU = 500.0  # mm^2/s, up to which thicker oil is taken to starve the rolling contacts further
 OIL_FLOW_HEAT = 27.0  # W/K per l/min, SKF; rho c_p of a mineral oil at 60 degC gives 28.5
 TEMPERATURE_TOL = 5e-3  # K
+# Exponents of d_m and F_r in the rolling and in the sliding variable, without an axial load (SKF 2016, table 2).
+EXPONENTS = {"cylindrical_roller": ((2.41, 0.31), (1.0, 1.0)), "deep_groove_ball": ((1.96, 0.54), (-0.26, 5.0 / 3.0))}
 
 
 def oil_flow_max(D_mm: float, B_mm: float) -> float:
@@ -71,21 +80,25 @@ def heat_dissipation_reference(d_mm: float, D_mm: float, B_mm: float) -> float:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SkfRollerBearing:
-    """A cylindrical roller bearing in an oil bath.
+class SkfBearing:
+    """A rolling bearing under a radial load in an oil bath.
 
     Attributes
     ----------
+    type : {"cylindrical_roller", "deep_groove_ball"}
     d, D, B : float
         Bore, outside diameter, width, [mm]
     H : float
         Oil level above the lowest contact of the outer raceway, [mm]
     mass : float
         [kg]
-    R1, S2 : float
-        Geometry constants of the series, [-]; S1 acts on an axial load, which spur gears do not make
-    K_rs, K_Z, K_L : float
-        Replenishment, bearing and roller constants, [-]
+    R1, S : float
+        Geometry constants of the series, [-]: of rolling, and of sliding under a radial load (S2 of rollers, whose S1
+        acts on an axial load, which spur gears do not make; S1 of balls)
+    K_rs, K_Z : float
+        Replenishment and bearing constants, [-]
+    K_L : float
+        Roller constant, [-]; 0 of balls
     mu_bl, mu_EHL : float
         Friction coefficients of mixed lubrication and of the full film, [-]
     drag : {"2016", "2008"}
@@ -98,13 +111,14 @@ class SkfRollerBearing:
         Ambient temperature for eq. (8), [degC]: the definition's, also where a cycle gives another
     """
 
+    type: Literal["cylindrical_roller", "deep_groove_ball"]
     d: float
     D: float
     B: float
     H: float
     mass: float
     R1: float
-    S2: float
+    S: float
     K_rs: float
     K_Z: float
     K_L: float
@@ -145,17 +159,18 @@ class SkfRollerBearing:
         References
         ----------
         SKF "Rolling bearings", 2016, pp. 104-106: inlet-shear starvation, kinematic replenishment, mixed friction and
-        oil-bath drag. The viscosity in the drag moment is held at 500 mm^2/s, where the formula ends (250 for a bearing
-        more than half in oil; limits from memory). In the two factors of starvation it is held there too, which is our
-        choice: to the letter they leave an NU 207 at 1500 1/min in oil VG 150 of -20 degC a millionth of its rolling
-        friction. K_roll is 1e-12 of the catalogue's digits, by its worked magnitudes.
+        oil-bath drag, without an axial load, which changes the exponents of balls. The viscosity in the drag moment is
+        held at 500 mm^2/s, where the formula ends (250 for a bearing more than half in oil; limits from memory). In the
+        two factors of starvation it is held there too, which is our choice: to the letter they leave an NU 207 at 1500
+        1/min in oil VG 150 of -20 degC a millionth of its rolling friction. K_roll is 1e-12 of the catalogue's digits,
+        by its worked magnitudes.
 
         Examples
         --------
         NU 406 at 2165.7 rpm, 4463 N and 15.41 mm^2/s:
 
-        >>> bearing = SkfRollerBearing(d=30, D=90, B=23, H=17, mass=0.75, R1=1e-6, S2=0.0015, K_rs=3e-8,
-        ...                            K_Z=5.1, K_L=0.65, mu_bl=0.12, mu_EHL=0.02)
+        >>> bearing = SkfBearing(type="cylindrical_roller", d=30, D=90, B=23, H=17, mass=0.75, R1=1e-6, S=0.0015,
+        ...                      K_rs=3e-8, K_Z=5.1, K_L=0.65, mu_bl=0.12, mu_EHL=0.02)
         >>> [round(float(M), 1) for M in bearing.friction_moments(n_rpm=2165.7, F_r=4463.0, nu=15.41)]
         [127.1, 9.4, 12.0]
         """
@@ -164,9 +179,12 @@ class SkfRollerBearing:
         held = np.minimum(nu, STARVATION_NU)
         starvation = 1.0 / (1.0 + 1.84e-9 * (n * d_m) ** 1.28 * held**0.64)
         replenishment = np.exp(-self.K_rs * held * n * (d + D) * np.sqrt(self.K_Z / (2.0 * (D - d))))
-        M_rr = starvation * replenishment * self.R1 * d_m**2.41 * np.asarray(F_r) ** 0.31 * (nu * n) ** 0.6
+        of_rolling, of_sliding = EXPONENTS[self.type]
+        G_rr = self.R1 * d_m ** of_rolling[0] * np.asarray(F_r) ** of_rolling[1]
+        G_sl = self.S * d_m ** of_sliding[0] * np.asarray(F_r) ** of_sliding[1]
+        M_rr = starvation * replenishment * G_rr * (nu * n) ** 0.6
         mixed = np.exp(-2.6e-8 * (n * nu) ** 1.4 * d_m)
-        M_sl = self.S2 * d_m * np.asarray(F_r) * (mixed * self.mu_bl + (1.0 - mixed) * self.mu_EHL)
+        M_sl = G_sl * (mixed * self.mu_bl + (1.0 - mixed) * self.mu_EHL)
         return np.asarray(M_rr), np.asarray(M_sl), self._drag_moment(n, nu)
 
     def _drag_moment(self, n: Array, nu: Array) -> Array:
@@ -177,17 +195,20 @@ class SkfRollerBearing:
         t = 2.0 * np.arccos(np.clip((0.6 * d_m - H) / (0.6 * d_m), -1.0, 1.0))
         if t == 0.0:
             return np.zeros(np.broadcast_shapes(n.shape, nu.shape))
-        V_M = float(np.interp(H / d_m, V_M_LEVEL, V_M_ROLLER))
-        K_roll = self.K_L * self.K_Z * (d + D) / (D - d) * 1e-12
-        if self.drag == "2008":  # one term only; the churning of the rollers came with a later edition
-            return np.asarray(10.0 * V_M * K_roll * self.B * d_m**4 * n**2 + 0.0 * nu)
-        l_D = 5.0 * self.K_L * self.B / d_m
-        C_w = 2.789e-10 * l_D**3 - 2.786e-4 * l_D**2 + 0.0195 * l_D + 0.6439
+        rolls = self.K_Z * (d + D) / (D - d) * 1e-12
+        if self.type == "deep_groove_ball":
+            drag_2008 = float(np.interp(H / d_m, V_M_BALL_LEVEL, V_M_BALL)) * rolls * d_m**5
+            drag = 0.4 * drag_2008
+        else:
+            drag_2008 = 10.0 * float(np.interp(H / d_m, V_M_LEVEL, V_M_ROLLER)) * self.K_L * rolls * self.B * d_m**4
+            l_D = 5.0 * self.K_L * self.B / d_m
+            drag = 0.4 * (2.789e-10 * l_D**3 - 2.786e-4 * l_D**2 + 0.0195 * l_D + 0.6439) * drag_2008
+        if self.drag == "2008":  # one term only; the churning of the rolling elements came with a later edition
+            return np.asarray(drag_2008 * n**2 + 0.0 * nu)
         f_t = np.sin(0.5 * t) if t <= np.pi else 1.0
         R_s = 0.36 * d_m**2 * (t - np.sin(t)) * 0.05 * self.K_Z * (D + d) / (D - d)
-        roll = 4.0 * V_M * K_roll * C_w * self.B * d_m**4
         churn = 1.093e-7 * d_m**3 * R_s * (n * d_m**2 * f_t / nu) ** -1.379
-        return np.asarray((roll + churn) * n**2)
+        return np.asarray((drag + churn) * n**2)
 
     def loss(self, *, n_rpm: Array, F_r: Array, T_oil: Array, T_bearing: Array, oil: Oil) -> Array:
         """Power loss of the bearing.
@@ -231,7 +252,7 @@ class SkfRollerBearing:
 class BearingLaw:
     """A bearing in the oil of a gearbox; reads its own speed and radial load, oil and bearing temperature."""
 
-    bearing: SkfRollerBearing
+    bearing: SkfBearing
     oil: Oil
 
     def power(self, x: Array) -> Array:
@@ -247,17 +268,18 @@ def bearing_terms(gearbox: GearboxData) -> Iterator[LossTerm]:
     for table in gearbox.bearing:
         d, D, B = table.bore_mm, table.outside_diameter_mm, table.width_mm
         W_s = table.heat_dissipation_W_K
-        bearing = SkfRollerBearing(
+        bearing = SkfBearing(
+            type=table.type,
             d=d,
             D=D,
             B=B,
             H=table.oil_level(level_mm),
             mass=table.mass_kg,
             R1=table.R1,
-            S2=table.S2,
+            S=table.sliding_constant,
             K_rs=table.K_rs,
             K_Z=table.K_Z,
-            K_L=table.K_L,
+            K_L=table.K_L or 0.0,
             mu_bl=table.mu_bl,
             mu_EHL=table.mu_EHL,
             drag=table.drag,

@@ -19,7 +19,8 @@ from typing import Protocol
 import numpy as np
 
 from models.base.types import Array
-from models.definition.sections import Ambient, Bearing, Seal, Stage
+from models.definition.bearing_section import Bearing
+from models.definition.sections import Ambient, Seal, Stage
 from models.definition.sections import Oil as OilTable
 from models.formulas.oil import Oil
 

@@ -12,7 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from models.assembly.gearbox import Gearbox, load_gearbox
-from models.definition.sections import Bearing, Churning, Friction, Rolling, Seal, Section, Stage
+from models.definition.bearing_section import Bearing
+from models.definition.sections import Churning, Friction, Rolling, Seal, Section, Stage
 
 FZG, CONVEYOR = load_gearbox("fzg"), load_gearbox("conveyor")
 EVERY_BEARING = range(len(FZG.bearing))
@@ -31,11 +32,12 @@ OPTIONS: dict[str, Mapping[str, Any]] = {
     "default": {},
     "conveyor": {},
     "roelands": {"oil.pressure_viscosity": "roelands"},
+    "ball bearings": {f"bearing.{i}.designation": "6406" for i in EVERY_BEARING},  # another type has other constants
     **{
         f"{section.__name__}.{key} {choice}": {f"{place}.{key}": choice for place in places}
         for section, places in PLACES.items()
         for key, field in section.model_fields.items()
-        if get_origin(field.annotation) is Literal
+        if get_origin(field.annotation) is Literal and key != "type"
         for choice in get_args(field.annotation)
         if choice not in (FZG.leaves[f"{places[0]}.{key}"], WRITTEN_OUT)
     },

@@ -8,7 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from models.assembly.gearbox import Gearbox
-from models.definition.sections import Bearing, Shaft
+from models.definition.bearing_section import Bearing
+from models.definition.sections import Shaft
 from models.formulas.geometry import GearPair
 
 T_SERVICE = 60.0  # degC, where the properties of the oil are taken that plants hold constant

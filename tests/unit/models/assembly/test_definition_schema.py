@@ -101,5 +101,5 @@ def test_a_commented_definition_is_the_machine_that_it_began_from(like: str) -> 
 
 def test_a_default_that_a_comment_shows_can_be_uncommented() -> None:
     text = commented_definition("conveyor", name="mine", file="mine.toml", schema="x.json")
-    assert "\n# K_Z = 5.1\n" in text
-    assert read_gearbox(text.replace("\n# K_Z = 5.1\n", "\nK_Z = 5.3\n"), file="mine.toml").bearing[0].K_Z == 5.3
+    assert "\n# K_rs = 3e-08\n" in text
+    assert read_gearbox(text.replace("\n# K_rs = 3e-08\n", "\nK_rs = 6e-8\n"), file="mine.toml").bearing[0].K_rs == 6e-8

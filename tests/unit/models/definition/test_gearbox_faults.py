@@ -68,6 +68,12 @@ FAULTS = [
     ("mu_EHL = { value = 0.02,", "mu_EHL = { value = 0.6,", "bearing 'bearing_1'.mu_EHL: 0.6 is above 0.5"),
     ("value = 3.0e-8,", "value = 3.0e-2,", "bearing 'bearing_1'.K_rs: 0.03 is above 1e-06"),
     ("R1 = { value = 1.0e-6", "R1 = { value = 1.0", "bearing 'bearing_1'.R1: 1 is above 0.0001"),
+    ("K_L = 0.65", "S1 = 0.003", "bearing 'bearing_1': S1 is given, which a cylindrical_roller does not have in SKF's"),
+    (
+        'type = "cylindrical_roller"',
+        'type = "deep_groove_ball"',
+        "bearing 'bearing_1': S1 is missing of a deep_groove_",
+    ),
     ("value = 1.6, sd = 0.3", "value = -1.6, sd = 0.3", "seal 'seal_1'.temperature_coefficient: -1.6 is below 0"),
     # annotations
     ("sd = 0.01,", "sd = -0.01,", "stage.friction.mu_solid: sd must be a number above 0 or a text such as '20 %'"),

@@ -8,18 +8,17 @@ import pytest
 
 from models.assembly.gearbox import load_gearbox, read_gearbox
 from models.base.errors import InputError
-from models.definition.known_bearings import NEEDED, filled_by_designation, known_bearings
+from models.definition.known_bearings import FILLED, filled_by_designation, known_bearings
 from models.definition.values_with_source import Annotations
 from models.files.toml_file import packaged, read_text
 
 FZG = read_text(packaged("gearboxes", "fzg"))
-OWN = ("bore_mm", "outside_diameter_mm", "width_mm", "mass_kg", "R1", "S2", "type", "model")
 
 
 def without_sizes(text: str) -> str:
     """A definition whose bearings leave out what their designation tells."""
     before, bearings = text.split("[[bearing]]", 1)
-    kept = [line for line in bearings.split("[[seal]]")[0].splitlines() if line.partition(" =")[0] not in OWN]
+    kept = [line for line in bearings.split("[[seal]]")[0].splitlines() if line.partition(" =")[0] not in FILLED]
     return before + "[[bearing]]" + "\n".join(kept) + "\n\n[[seal]]" + bearings.split("[[seal]]", 1)[1]
 
 
@@ -42,7 +41,7 @@ def test_sizes_are_those_of_the_dimension_series(name: str) -> None:
 
 def test_what_a_file_gives_is_kept() -> None:
     notes = Annotations()
-    own = {"designation": "NU 207 ECP", **dict.fromkeys(NEEDED, 1.0)}
+    own = {"designation": "NU 207 ECP", **dict.fromkeys(FILLED, 1.0)}
     assert filled_by_designation(own, notes, "bearing.0") == own
     assert filled_by_designation({**own, "designation": "my own"}, notes, "bearing.0")["designation"] == "my own"
     assert not notes.sources and not notes.faults
@@ -56,5 +55,40 @@ def test_an_unknown_designation_is_one_fault_that_says_what_to_give(tmp_path: Pa
     lines = str(caught.value).splitlines()
     assert len(lines) == 4  # one per bearing, and no line for every key that follows from it
     assert "bearing 'bearing_1'.designation: sizes of 'NU 999' are not known; give bore_mm" in lines[0]
-    assert "Bearings other than cylindrical roller bearings are not supported" in lines[0]
-    assert "known are NU 204 to NU 220 and NU 406" in lines[0]
+    assert "type, S1 (balls) or S2 (rollers) (known are" in lines[0]
+    assert "Bearings of other types than cylindrical_roller and deep_groove_ball are not supported" in lines[0]
+
+
+@pytest.mark.parametrize(
+    ("written", "known"), [("NJ 207 ECP", "NU 207"), ("NU2210", "NU 2210"), ("N 306", "NU 306"), ("6208-2Z", "6208")]
+)
+def test_what_a_designation_is_taken_for(written: str, known: str) -> None:
+    def filled(name: str) -> dict[str, object]:
+        return filled_by_designation({"designation": name}, Annotations(), "bearing.0")
+
+    assert filled(written) | {"designation": known} == filled(known)
+    assert filled(known)["bore_mm"] == 5.0 * int(known[-2:])
+
+
+@pytest.mark.parametrize("name", ["6208-2RS1", "QJ 208", "208", "62208", "NUP 2299"])
+def test_a_seal_and_other_types_are_not_known(name: str) -> None:
+    notes = Annotations()
+    assert filled_by_designation({"designation": name}, notes, "bearing.0") == {"designation": name}
+    assert [path for path, _ in notes.faults] == ["bearing.0.designation"]
+
+
+def test_another_type_brings_its_constants() -> None:
+    rig = load_gearbox("fzg")
+    balls = rig.with_values({f"bearing.{index}.designation": "6406" for index in range(4)})
+    assert [(b.type, b.R1, b.S1, b.S2, b.K_Z, b.K_L, b.mu_EHL) for b in balls.bearing] == [
+        ("deep_groove_ball", 3.6e-7, 2.43e-3, None, 3.1, None, 0.05)
+    ] * 4
+    assert {path.split(".")[-1] for path in balls.priors if path.startswith("bearing.0")} >= {"S1", "R1", "mass_kg"}
+    assert "bearing.0.S2" not in balls.priors
+    back = balls.with_values({f"bearing.{index}.designation": "NU 406" for index in range(4)})
+    assert back.hash == rig.hash
+
+
+def test_own_friction_of_a_film_stays_with_the_type() -> None:
+    rig = load_gearbox("fzg").with_values({"bearing.0.mu_EHL": 0.015})
+    assert rig.with_values({"bearing.0.designation": "NU 306"}).bearing[0].mu_EHL == 0.015

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from models.assembly.gearbox import Gearbox, load_gearbox
+from models.definition.bearing_section import Bearing
 from models.definition.sections import (
-    Bearing,
     Churning,
     Fluid,
     Housing,
@@ -21,8 +21,7 @@ from models.definition.sections import (
 
 # A file of schema 1 that leaves a number or a switch open means this one, today and later.
 DEFAULTS: dict[type[Section], dict[str, float | bool]] = {
-    # SKF, Rolling bearings, 2016: low oil bath, cylindrical roller bearings with cage (NU), mineral oil
-    Bearing: {"K_rs": 3e-8, "K_Z": 5.1, "K_L": 0.65, "mu_bl": 0.12, "mu_EHL": 0.02},
+    Bearing: {"K_rs": 3e-8, "mu_bl": 0.12},  # SKF, Rolling bearings, 2016: low oil bath
     Seal: {"temperature_coefficient": 1.6},  # ISO/TR 14179-2, Linke
     Rolling: {"constant_N_m2": 9.0e7},  # Anderson and Loewenthal
     Churning: {"C_Sp": 1.0},  # Mauz: no splash guard
@@ -42,6 +41,15 @@ DEFAULTS: dict[type[Section], dict[str, float | bool]] = {
 def test_a_value_left_open(section: type[Section]) -> None:
     found = {key: field.default for key, field in section.model_fields.items() if type(field.default) in (float, bool)}
     assert found == DEFAULTS[section]
+
+
+def test_constants_of_a_bearing_left_open(fzg: Gearbox) -> None:
+    """SKF, Rolling bearings, 2016: cylindrical roller bearings with cage, deep groove ball bearings; mineral oil."""
+    left_open = fzg.bearing[0].model_dump(exclude={"K_Z", "K_L", "mu_EHL", "S1", "S2"}, exclude_none=True)
+    roller = Bearing.model_validate(left_open | {"S2": 0.0015})
+    assert (roller.K_Z, roller.K_L, roller.mu_EHL) == (5.1, 0.65, 0.02)
+    ball = Bearing.model_validate(left_open | {"type": "deep_groove_ball", "S1": 0.003})
+    assert (ball.K_Z, ball.K_L, ball.mu_EHL) == (3.1, None, 0.05)
 
 
 def test_choices_left_open_are_those_of_the_paper(fzg: Gearbox) -> None:

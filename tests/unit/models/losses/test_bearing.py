@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from models.assembly.gearbox import load_gearbox
-from models.losses.bearing import OIL_FLOW_HEAT, SkfRollerBearing, oil_flow_max
+from models.losses.bearing import OIL_FLOW_HEAT, SkfBearing, oil_flow_max
 
 GEARBOX = load_gearbox("fzg")
 OIL = GEARBOX.lubricant()
 NU_406 = GEARBOX.losses().term("bearing_1").law.bearing
 
 
-def watts(bearing: SkfRollerBearing, n: float, F_r: float, T_oil: float, T_bearing: float) -> float:
+def watts(bearing: SkfBearing, n: float, F_r: float, T_oil: float, T_bearing: float) -> float:
     one = np.ones(1)
     loss = bearing.loss(n_rpm=n * one, F_r=F_r * one, T_oil=T_oil * one, T_bearing=T_bearing * one, oil=OIL)
     return float(loss[0])
@@ -38,7 +38,7 @@ def test_sliding_friction_goes_from_boundary_to_full_film() -> None:
     assert fast == pytest.approx(0.0015 * 60 * 1000 * 0.02, rel=1e-9)
 
 
-def drag(bearing: SkfRollerBearing, n: float = 2000.0, nu: float = 15.0) -> float:
+def drag(bearing: SkfBearing, n: float = 2000.0, nu: float = 15.0) -> float:
     return float(bearing.friction_moments(n_rpm=n, F_r=1000.0, nu=nu)[2])
 
 
@@ -71,6 +71,31 @@ def test_oil_beyond_the_limit_starves_a_bearing_no_further(n: float) -> None:
     assert rolling(499.0) < rolling(499.0, K_rs=0.0)
     replenished = np.exp(-3e-8 * 400.0 * n * 120.0 * np.sqrt(5.1 / 120.0))
     assert rolling(400.0) / rolling(400.0, K_rs=0.0) == pytest.approx(replenished, rel=1e-12)
+
+
+BALL_6208 = SkfBearing(
+    type="deep_groove_ball", d=40, D=80, B=18, H=20, mass=0.37, R1=3.9e-7, S=3.23e-3, K_rs=3e-8, K_Z=3.1, K_L=0.0,
+    mu_bl=0.12, mu_EHL=0.05,
+)  # fmt: skip
+
+
+def test_ball_bearing_of_a_worked_case() -> None:
+    """6208 at 1500 1/min, 1500 N and 32 mm^2/s, worked by hand from the catalogue's table: N mm."""
+    moments = BALL_6208.friction_moments(n_rpm=1500.0, F_r=1500.0, nu=32.0)
+    assert [float(M) for M in moments] == pytest.approx([37.109, 11.006, 5.979], rel=5e-4)
+
+
+def test_balls_roll_and_slide_by_other_powers_of_the_load() -> None:
+    light, heavy = (BALL_6208.friction_moments(n_rpm=1500.0, F_r=F, nu=32.0) for F in (1000.0, 2000.0))
+    assert heavy[0] / light[0] == pytest.approx(2.0**0.54, rel=1e-12)
+    assert heavy[1] / light[1] == pytest.approx(2.0 ** (5.0 / 3.0), rel=1e-12)
+
+
+def test_drag_of_balls_in_the_older_edition_is_its_one_term() -> None:
+    """``V_M K_ball d_m^5 n^2`` with V_M = 4.144e-4 at H = d_m / 3 and K_ball = 3.1 * 120 / 40 * 1e-12."""
+    old = replace(BALL_6208, drag="2008")
+    assert drag(old) == pytest.approx(4.144e-4 * 9.3e-12 * 60**5 * 2000.0**2, rel=1e-3)
+    assert drag(replace(old, H=0.0)) == 0.0
 
 
 def test_own_weight_is_the_least_load() -> None:
