@@ -128,7 +128,7 @@ def diagnose(
         if posterior.elsewhere is not None:
             progress("calibrating again from a better start that was seen")
             again = recalibrate(calibration, posterior.elsewhere)
-            if again.chosen.log_evidence > calibration.chosen.log_evidence:
+            if again is not calibration:
                 calibration = again
                 posterior = weigh(calibration, scan_at(calibration, candidates), outside=outside, rival=rival)
         faulty, rest = faulty_channels(posterior, apart), None

@@ -14,7 +14,7 @@ from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.families import with_priors
 from diagnosis.engine.fit import Experiment
 from diagnosis.engine.learnt import rule
-from diagnosis.engine.scan import scan
+from diagnosis.engine.scan import scan, scope_of
 
 CandidatesIn = Callable[[Experiment], Sequence[Hypothesis]]
 
@@ -58,18 +58,17 @@ def judge_baselines(
         for piece in map(experiment.pieces.__getitem__, pieces):
             now = starts.setdefault(piece.recording, now) + float(piece.time[-1])
         swapped = replace(experiment, healthy=whole.healthy - starts.keys(), starts_at=starts)
-        tried = [one for one in candidates_in(swapped) if one.term is None or whole.scope_of(one.name) is not None]
-        if not any(one.how == "always" for one in tried):  # what is switched off has no place in this machine
-            continue
+        tried = [one for one in candidates_in(swapped) if one.term is None or scope_of(whole, one) is not None]
         there = scan(replace(fit, experiment=swapped), with_priors(tried), columns)
         judged = scan_in_classes(calibration, there)
         longer = max(tested / sum(hours[name] for name in starts), 1.0)
         always = _part(judged, [i for i, one in enumerate(judged.candidates) if one.how not in OVER_TIME])
-        best = next(one for one in map(always.candidates.__getitem__, always.order) if one.term is not None)
-        session = experiment.session_of.get(min(starts), "")
-        reached.append(
-            Placebo(session=session, log_e_value=always.log_e * longer, mechanism=best.mechanism, place=best.place)
-        )
+        best = next((one for one in map(always.candidates.__getitem__, always.order) if one.term is not None), None)
+        if best is not None:  # else what is switched off has no place in this machine
+            session = experiment.session_of.get(min(starts), "")
+            reached.append(
+                Placebo(session=session, log_e_value=always.log_e * longer, mechanism=best.mechanism, place=best.place)
+            )
         for one, value, here in zip(judged.candidates, judged.log_bayes.tolist(), judged.best, strict=True):
             if one.how in OVER_TIME:
                 taken = float(counts_less([one], calibration.chosen.error_class, here.error_class)[0])
@@ -90,5 +89,6 @@ def are_trusted(sessions: int, lasting: float, tested: float) -> bool:
 
 
 def _part(scanned: Scanned, at: Sequence[int]) -> Scanned:
-    return replace(scanned, candidates=tuple(scanned.candidates[i] for i in at),
-                   log_bayes=scanned.log_bayes[np.array(at)], best=tuple(scanned.best[i] for i in at))  # fmt: skip
+    candidates, best = ([every[i] for i in at] for every in (scanned.candidates, scanned.best))
+    log_bayes = scanned.log_bayes[np.array(at, dtype=int)]
+    return replace(scanned, candidates=tuple(candidates), log_bayes=log_bayes, best=tuple(best))

@@ -8,7 +8,7 @@ from functools import cache, cached_property
 
 import numpy as np
 
-from diagnosis.engine.fit import FIRST_ITERATIONS, ITERATIONS, Experiment, Fit, Linear
+from diagnosis.engine.fit import FIRST_ITERATIONS, ITERATIONS, NO_SOLUTION, Experiment, Fit, Linear
 from diagnosis.engine.gram import Gram, gram_of, whitened_base
 from diagnosis.engine.learnt import ErrorClass, error_classes, rule, widest_class
 from diagnosis.engine.metric import Metric, leading_directions
@@ -288,13 +288,8 @@ def _with_random_heat(experiment: Experiment, error: ModelError, fit: Fit) -> Ca
 def calibrate_in_draughts(calibration: Calibration) -> Calibration | None:
     """Calibration in draughts, which change the heat of all parts to the surroundings by one random share.
 
-    None if they bring less evidence than :attr:`Rule.draughts` asks for, or channels were set apart: a broken sensor is
-    no draught.
-
-    Raises
-    ------
-    ArithmeticError
-        If the simulation has no solution there.
+    None if they bring less evidence than :attr:`Rule.draughts` asks for, have no solution, or channels were set apart:
+    a broken sensor is no draught.
     """
     if calibration.of_others is not None:
         return None
@@ -305,14 +300,21 @@ def calibrate_in_draughts(calibration: Calibration) -> Calibration | None:
     if log_evidence(times) < log_evidence(has) + worth:
         return None
     free = replace(near.experiment.with_random_heat(times), most_deviation=np.inf)
-    found = _with_random_heat(free, near.error, fit)
+    try:
+        found = _with_random_heat(free, near.error, fit)
+    except NO_SOLUTION:
+        return None
     return found if found.chosen.log_evidence > calibration.chosen.log_evidence else None
 
 
 def recalibrate(calibration: Calibration, fit: Fit) -> Calibration:
-    """Calibration about the courses of another fit of the same machine, in the class that is best there."""
-    near = NearReadings.of(calibration.near.experiment, calibration.near.error, fit)
-    return replace(_settled(near, fit), of_others=calibration.of_others)
+    """Calibration about the courses of another fit of the same machine, if it is more probable, in the best class."""
+    try:
+        again = _settled(NearReadings.of(calibration.near.experiment, calibration.near.error, fit), fit)
+    except NO_SOLUTION:
+        return calibration
+    better = again.chosen.log_evidence > calibration.chosen.log_evidence
+    return replace(again, of_others=calibration.of_others) if better else calibration
 
 
 def _settled(near: NearReadings, fit: Fit) -> Calibration:

@@ -193,7 +193,6 @@ def read_recording(
         time=seconds - seconds[0],
         start=None if since_1970 is None else epoch + timedelta(seconds=since_1970 + float(seconds[0])),
         from_s=float(seconds[0]),
-        to_s=float(seconds[-1]),
         clock=clock,
         rows=found.rows,
         inputs={name: found.values[name] for name in found.inputs(network)},

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -72,13 +74,13 @@ class Recording:
     files : tuple of Path
         In the order of time
     sha256 : str
-        Of the file; of the hashes of several
+        Of the file; of the hashes of several; empty if it is of no file
     time : Array, shape (rows,)
         Since the recording's first row, [s], strictly increasing
     start : datetime or None
         Of the first row, if the file has dates
-    from_s, to_s : float
-        First and last row in the file's own time, [s], dates since 1970
+    from_s : float
+        First row in the file's own time, [s], dates since 1970
     clock : Clock or None
         The file's time column
     rows : array of int, shape (rows,)
@@ -103,11 +105,10 @@ class Recording:
     name: str
     path: Path
     files: tuple[Path, ...] = ()
-    sha256: str
+    sha256: str = ""
     time: Array
     start: datetime | None = None
     from_s: float = 0.0
-    to_s: float = 0.0
     clock: Clock | None = None
     rows: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     inputs: Mapping[str, Array]
@@ -123,6 +124,22 @@ class Recording:
         begin = "" if self.start is None else f" from {self.start:%Y-%m-%d %H:%M} UTC"
         rows = f"{len(self.time)} rows over {self.time[-1] / 3600.0:.1f} h{begin}"
         return f"<Recording {self.name!r}: {rows}; {', '.join(c.name for c in self.channels)}>"
+
+    @cached_property
+    def hash(self) -> str:
+        """SHA-256 of its file, the same for all parts of it; of its values if it is of no file."""
+        if self.sha256:
+            return self.sha256
+        columns = {"time": self.time, **self.inputs, **{f"T_{c.name}": c.values for c in self.channels}}
+        digest = hashlib.sha256()
+        for name, values in sorted(columns.items()):
+            digest.update(name.encode() + np.ascontiguousarray(values, dtype=float).tobytes())
+        return digest.hexdigest()
+
+    @property
+    def to_s(self) -> float:
+        """Last row in the file's own time, [s]."""
+        return self.from_s + float(self.time[-1])
 
     @property
     def cycle(self) -> Cycle:

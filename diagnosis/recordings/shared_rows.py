@@ -49,7 +49,7 @@ def check_shared_rows(
 
 def _shared(one: Recording, other: Recording, mine: NDArray[np.uint64], theirs: NDArray[np.uint64]) -> str:
     """Describe the overlap of two recordings, as the start of a sentence that ends with a file; empty without one."""
-    if one.sha256 == other.sha256:
+    if one.hash == other.hash:
         first, last = max(one.from_s, other.from_s), min(one.to_s, other.to_s)
         if last < first:
             return ""

@@ -168,7 +168,7 @@ def _provenance(setup: InferenceSetup) -> dict[str, Any]:
     """Hashes of all that was given, and the version."""
 
     def hashes(recordings: Sequence[Recording]) -> dict[str, str]:
-        return {recording.name: recording.sha256 for recording in recordings}
+        return {recording.name: recording.hash for recording in recordings}
 
     return {
         "recordings": hashes(setup.recordings),

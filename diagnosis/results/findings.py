@@ -13,6 +13,7 @@ from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.answer import Answer
 from diagnosis.decision.posterior import Posterior
 from diagnosis.engine.fit import Experiment, Fit
+from diagnosis.engine.scan import scope_of
 from diagnosis.engine.unknown import SensorBias
 from diagnosis.forward.grid import Piece
 from diagnosis.forward.term_on_grid import TermOnGrid
@@ -285,7 +286,8 @@ def mean_heat_of(fit: Fit, effect: Hypothesis) -> tuple[float, float]:
             | {u.parameter.name: u.value(z) for u, z in zip(unknowns, row, strict=True)}
             for row in moved.tolist()]  # fmt: skip
     values = np.array([[row[name] for name in names] for row in rows])
-    acting = [part.point.trajectory.piece.recording not in fit.experiment.healthy for part in fit.parts]
+    scope = scope_of(fit.experiment, effect)
+    acting = [scope is None or part.point.trajectory.piece.recording in scope for part in fit.parts]
     steps = np.concatenate([
         part.point.trajectory.piece.steps * acts for part, acts in zip(fit.parts, acting, strict=True)
     ])  # fmt: skip
@@ -298,7 +300,7 @@ def mean_heat_of(fit: Fit, effect: Hypothesis) -> tuple[float, float]:
 def _heats_with(fit: Fit, effect: Hypothesis, values: Array) -> list[Array]:
     """Heat with each row of `values`, the first as fitted, for its parameters; shape (K, rows) per piece, [W]."""
     experiment = fit.experiment
-    term, result = TermOnGrid(experiment.machine.model, effect.added), []
+    term, scope, result = TermOnGrid(experiment.machine.model, effect.added), scope_of(experiment, effect), []
     for part in fit.parts:
         trajectory = part.point.trajectory
         recording, here = trajectory.piece.recording, np.array(values)
@@ -307,7 +309,7 @@ def _heats_with(fit: Fit, effect: Hypothesis, values: Array) -> list[Array]:
         heat = np.nan_to_num(term.heat(trajectory, here, there=here[0])[0])
         positive, negative = heat.clip(0.0).sum(axis=1), heat.clip(None, 0.0).sum(axis=1)
         total = np.where(positive > -negative, positive, negative)
-        result.append(total * (recording not in experiment.healthy))
+        result.append(total * (scope is None or recording in scope))
     return result
 
 

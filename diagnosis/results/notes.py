@@ -12,7 +12,7 @@ from diagnosis.decision.answer import Answer
 from diagnosis.decision.posterior import Placebo, Posterior
 from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.scale import scale_direction
-from diagnosis.engine.scan import scan
+from diagnosis.engine.scan import scan, scope_of
 from diagnosis.engine.sessions import sessions_apart
 
 NOTED_FROM = 5.0  # nats
@@ -25,7 +25,8 @@ def baseline_notes(experiment: Experiment, posterior: Posterior, answers: Sequen
     nothing = posterior.nothing.fit
     if not experiment.healthy or nothing is None:
         return ()
-    effect = next((answer.effect for answer in answers[:1] if answer.effect.term is not None), None)
+    found = (answer.effect for answer in answers[:1] if answer.effect.term is not None)
+    effect = next((one for one in found if scope_of(experiment, one) is not None), None)  # else it may act in them
     best = (answers[0].best.fit if answers else None) or nothing
     single = [one for one in posterior.judged if len(one.effects) == 1]
     ahead = max(single, key=lambda one: one.weight + one.effects[0].less, default=None)

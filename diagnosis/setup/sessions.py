@@ -24,9 +24,9 @@ def session_by_recording(
     dict of recording to session
     """
     given = {r.name: r.session for r in (*train, *holdout)}
-    of_file = {r.sha256: r.session for r in (*train, *holdout)}
+    of_file = {r.hash: r.session for r in (*train, *holdout)}
     for recording in baseline:
-        usual = of_file.setdefault(recording.sha256, recording.session or recording.name)
+        usual = of_file.setdefault(recording.hash, recording.session or recording.name)
         given[recording.name] = recording.session or usual
     return given
 
@@ -37,8 +37,8 @@ def start_times(recordings: Sequence[Recording]) -> dict[str, float]:
     Parameters
     ----------
     recordings : sequence of Recording
-        If all have dates these count; else they follow each other in this order without gaps. A
-        name that comes again (learnt from and predicted) counts once
+        If all have dates these count; else their files follow each other in this order without gaps, and parts of a
+        file lie as in it. A name that comes again (learnt from and predicted) counts once
 
     Returns
     -------
@@ -48,13 +48,15 @@ def start_times(recordings: Sequence[Recording]) -> dict[str, float]:
     dates = {recording.name: recording.start.timestamp() for recording in recordings if recording.start is not None}
     if all(recording.name in dates for recording in recordings):
         return {name: date - min(dates.values()) for name, date in dates.items()}
+    files: dict[str, dict[str, Recording]] = {}
+    for recording in recordings:
+        files.setdefault(recording.hash, {})[recording.name] = recording
     result: dict[str, float] = {}
     now = 0.0
-    for recording in recordings:
-        if recording.name in result:
-            continue
-        result[recording.name] = now
-        now += float(recording.time[-1])
+    for parts in files.values():
+        first, last = min(part.from_s for part in parts.values()), max(part.to_s for part in parts.values())
+        result |= {name: now + part.from_s - first for name, part in parts.items()}
+        now += last - first
     return result
 
 

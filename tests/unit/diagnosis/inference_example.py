@@ -30,7 +30,7 @@ NODES = ("oil", "housing_lower", "bearing_1", "pinion")
 def recording_of(columns: dict[str, Array], channels: dict[str, Array]) -> Recording:
     time = columns["time_s"]
     return Recording(
-        name="made", path=Path("made.csv"), sha256="0" * 64, time=time,
+        name="made", path=Path("made.csv"), time=time,
         inputs={"speed": columns["speed_rpm"], "torque": columns["torque_Nm"], "T_ambient": columns["T_ambient_degC"],
                 "air_speed": np.full(len(time), 2.0)},
         channels=tuple(Channel(name=n, values=v) for n, v in channels.items()), segments=(slice(0, len(time)),),

@@ -47,7 +47,8 @@ def test_all_is_judged_once_more_from_a_better_basin(
 
     result = diagnosed(
         fzg, monkeypatch, infer=infer, calibrate_with_error=lambda *_: calibration("first", 0.0),
-        calibrate_in_draughts=lambda *_: None, recalibrate=lambda *_: calibration("second", again),
+        calibrate_in_draughts=lambda *_: None,
+        recalibrate=lambda first, _: calibration("second", again) if again > 0.0 else first,
     )  # fmt: skip
     assert found == judged and result == (reported, reported)
 

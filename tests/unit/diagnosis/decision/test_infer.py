@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ from diagnosis.decision.infer import (
     _worth_a_fit,
     infer,
 )
-from diagnosis.decision.placebo import are_trusted
+from diagnosis.decision.placebo import CandidatesIn, are_trusted, judge_baselines
 from diagnosis.decision.posterior import KINDS, Judged, Posterior
 from diagnosis.decision.scanned import (
     ScanInClass,
@@ -41,7 +41,8 @@ from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.refit import with_candidate
 from diagnosis.engine.scan import scan
 from diagnosis.engine.unknown import TermParameter
-from diagnosis.results.findings import values_of
+from diagnosis.results import notes
+from diagnosis.results.findings import heats_of, values_of
 from models.assembly.gearbox import Gearbox
 from models.base.progress import silent
 from models.base.types import Array
@@ -54,10 +55,10 @@ LOOKED_FOR = ("windage", "air_cooling_change", "sensor_bias", "hot_neighbour")
 WINDAGE_W, AT_RPM, HOURS = 150.0, 3300.0, 1.5
 
 
-def inferred(
+def calibrated(
     fzg: Gearbox, windage_W: float, in_baselines_W: Sequence[float] = (0.0,), switched_off: Sequence[str] = (),
     bias_K: float = 0.0,
-) -> Posterior:  # fmt: skip
+) -> tuple[Calibration, CandidatesIn]:  # fmt: skip
     """A ride with windage in the oil, or without it, and a biased thermometer, and baselines of other days."""
     train = recorded(fzg, "train", windage_W=windage_W, hours=HOURS)
     train = replace(train, channels=tuple(
@@ -73,8 +74,12 @@ def inferred(
         return [*(hypothesis_of(one) for one in placed), *changes([], dated, axis_of(there), {}),
                 *parameters_outside(there)]  # fmt: skip
 
-    calibration = calibrate_with_error(experiment, calibrate(experiment))
-    found = scan_at(calibration, candidates_in(experiment))
+    return calibrate_with_error(experiment, calibrate(experiment)), candidates_in
+
+
+def inferred(fzg: Gearbox, windage_W: float, **given: Any) -> Posterior:
+    calibration, candidates_in = calibrated(fzg, windage_W, **given)
+    found = scan_at(calibration, candidates_in(calibration.fit.experiment))
     return infer(calibration, found, Settings(), candidates_in=candidates_in)
 
 
@@ -86,6 +91,20 @@ def healthy(fzg: Gearbox) -> Posterior:
 @pytest.fixture(scope="module")
 def concealed(fzg: Gearbox) -> Posterior:
     return inferred(fzg, WINDAGE_W)
+
+
+def test_what_is_not_off_in_the_baselines_has_its_heat_in_them_and_no_note(
+    concealed: Posterior, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(notes, "evidence_in_baselines", lambda *_: 50.0)
+    answers = decide(concealed)
+    fit, effect = answers[0].best.fitted, answers[0].effect
+    everything_off, another_off = (replace(fit.experiment, switched_off=frozenset(of)) for of in ((), ("another",)))
+    april = [part.point.trajectory.piece.recording for part in fit.parts].index("april")
+    for experiment, acts in ((everything_off, False), (another_off, True)):
+        assert heats_of(replace(fit, experiment=experiment), effect)[april].any() == acts
+        noted = notes.baseline_notes(experiment, concealed, answers)
+        assert any("show windage too" in note for note in noted) != acts
 
 
 def test_a_healthy_machine_stays_silent(healthy: Posterior) -> None:
@@ -133,6 +152,15 @@ def test_an_effect_in_the_recordings_raises_nothing(fzg: Gearbox) -> None:
     assert found.detected and found.explanations[0].names == ("sensor_bias",)
     assert found.nothing.fit is not None  # the baselines repeat, so the recordings do not say otherwise
     assert found.nothing.fit.experiment.most_deviation == rule().repeats >= found.assumed.session_s
+
+
+def test_changes_over_time_count_beyond_the_baselines_whatever_is_switched_off_in_them(fzg: Gearbox) -> None:
+    """Of what always acts only the mechanism that is off is judged in them, and this one has no place."""
+    calibration, candidates_in = calibrated(fzg, 0.0, in_baselines_W=(WINDAGE_W, 0.0), switched_off=["none"])
+    placebo, judged = judge_baselines(calibration, candidates_in(calibration.fit.experiment), candidates_in)
+    assert placebo is None
+    less = {one.name: one.less for one in judged}
+    assert less["windage_step"] > 10.0 and less["windage"] == 0.0
 
 
 @pytest.mark.slow

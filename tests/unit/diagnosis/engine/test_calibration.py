@@ -51,6 +51,19 @@ def test_it_is_judged_by_the_random_heat_that_its_readings_show(found: Calibrati
     assert recalibrate(found, found.fit).fit.experiment.random_heat == chosen.random_heat
 
 
+def test_where_another_start_is_no_better_or_has_no_solution_all_stays(
+    found: Calibration, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ahead = replace(found, chosen=replace(found.chosen, log_evidence=found.chosen.log_evidence + 100.0))
+    assert recalibrate(ahead, found.fit) is ahead
+
+    def fails(*_: object) -> NearReadings:
+        raise ArithmeticError("no solution")
+
+    monkeypatch.setattr(NearReadings, "of", fails)
+    assert recalibrate(found, found.fit) is found
+
+
 def test_it_has_settled(found: Calibration) -> None:
     chosen = found.chosen
     near = NearReadings.of(chosen.fit.experiment, found.near.error, chosen.fit)

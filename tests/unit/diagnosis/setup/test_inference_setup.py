@@ -35,7 +35,7 @@ def recordings(fzg: Gearbox) -> tuple[Recording, Recording]:
         result = fzg.network().simulate(cycle, losses=fzg.losses(), initial=25.0).temperatures
         channels = tuple(Channel(name=n, values=result[n] + 0.2 * rng.normal(size=len(time))) for n in CHANNELS)
         made.append(Recording(
-            name=f"ride_{seed}", path=Path(f"ride_{seed}.csv"), sha256="0" * 64, time=time, inputs=inputs,
+            name=f"ride_{seed}", path=Path(f"ride_{seed}.csv"), time=time, inputs=inputs,
             channels=channels, segments=(slice(0, len(time)),),
         ))  # fmt: skip
     return made[0], made[1]
