@@ -89,6 +89,7 @@ def are_trusted(sessions: int, lasting: float, tested: float) -> bool:
 
 
 def _part(scanned: Scanned, at: Sequence[int]) -> Scanned:
-    candidates, best = ([every[i] for i in at] for every in (scanned.candidates, scanned.best))
-    log_bayes = scanned.log_bayes[np.array(at, dtype=int)]
-    return replace(scanned, candidates=tuple(candidates), log_bayes=log_bayes, best=tuple(best))
+    return replace(
+        scanned, candidates=tuple(scanned.candidates[i] for i in at), best=tuple(scanned.best[i] for i in at),
+        log_bayes=scanned.log_bayes[np.array(at, dtype=int)],
+    )  # fmt: skip
