@@ -440,7 +440,9 @@ class Fit:
         return np.asarray(np.linalg.cholesky(np.eye(len(self.z)) + self.linearised.products[1:, 1:]))
 
 
-def calibrate(experiment: Experiment, z: Array | None = None, guesses: Sequence[Guess] | None = None) -> Fit:
+def calibrate(
+    experiment: Experiment, z: Array | None = None, guesses: Sequence[Guess] | None = None, held: Sequence[int] = ()
+) -> Fit:
     """The unknowns from a start: a first fit chooses the noise filters, a second one is judged by them."""
-    first = experiment.fit(z, guesses, iterations=FIRST_ITERATIONS)
-    return experiment.with_filters(first.parts).fit(first.z, first.trajectories)
+    first = experiment.fit(z, guesses, iterations=FIRST_ITERATIONS, held=held)
+    return experiment.with_filters(first.parts).fit(first.z, first.trajectories, held=held)

@@ -10,15 +10,18 @@ from itertools import product
 import numpy as np
 
 from diagnosis.engine.fit import NO_SOLUTION, NOISE_ALONE, Experiment, Fit, Guess, calibrate
+from diagnosis.engine.mean_loss import mean_loss
 from diagnosis.engine.set_apart import without_channels
-from diagnosis.engine.unknown import SensorBias, SensorLag, TermParameter, Unknown
+from diagnosis.engine.unknown import NetworkParameter, SensorBias, SensorLag, TermParameter, Unknown
 from diagnosis.forward.whitening import AS_ASSUMED, RandomHeat
 from models.base.types import Array
 from models.quantities.quantities import is_total_loss
 from models.terms.term import Term
 
 QUIET = RandomHeat(heat=0.1, wander=0.1)  # times the random heat that is assumed
+NEARER_K = 0.1  # by which temperatures have to come nearer, before parameters may stand in for what the model lacks
 FAR_OFF = 2.0  # times the least error of the temperatures, beyond which a fit predicts too badly to be chosen
+LEAST_SHARE = 1e-6  # of the mean loss that an unknown changes per prior standard deviation
 
 
 def calibrated_to_predict(plain: Fit, with_error: Fit, start: Array | None = None) -> Fit:
@@ -29,7 +32,7 @@ def calibrated_to_predict(plain: Fit, with_error: Fit, start: Array | None = Non
     plain : Fit
         A first calibration, with random heat as assumed
     with_error : Fit
-        The same machine calibrated with model error: another start
+        The same machine calibrated with model error: another start, and the size of its losses
     start : Array, shape (unknowns,), or None
         Where the first calibration began; by default at the middles of the priors
 
@@ -39,7 +42,35 @@ def calibrated_to_predict(plain: Fit, with_error: Fit, start: Array | None = Non
         If there is no solution.
     """
     free = replace(plain.experiment, filters=None)
-    return _best_of(free, [plain, *_calibrations([(free, with_error.z), (free.with_random_heat(QUIET), start)])])
+    quiet = free.with_random_heat(QUIET)
+    return _best_of(free, [
+        _as_estimated(with_error, [free, quiet]),
+        [plain, *_calibrations([(free, with_error.z)])],
+        _calibrations([(quiet, start)]),
+    ])  # fmt: skip
+
+
+def _as_estimated(
+    with_error: Fit, experiments: Sequence[Experiment], guesses: Sequence[Guess] | None = None
+) -> Iterator[Fit]:
+    """Calibrations, each from the one before, with all losses as estimated with model error; none if one is measured.
+
+    Temperatures identify ratios of heats, conductances and capacities: by noise alone their common size would stand in
+    for what the model lacks.
+    """
+    if any(map(is_total_loss, with_error.experiment.pieces[0].channels)):
+        return
+    loss, slopes = mean_loss(with_error)
+    held = [
+        index for index, unknown in enumerate(with_error.experiment.unknowns)
+        if isinstance(unknown, NetworkParameter | TermParameter) and abs(slopes[index]) > LEAST_SHARE * loss
+    ]  # fmt: skip
+    z = with_error.z
+    for experiment in experiments:
+        with suppress(*NO_SOLUTION):
+            reached = calibrate(experiment, z, guesses, held)
+            z = reached.z
+            yield reached
 
 
 def _calibrations(
@@ -51,21 +82,26 @@ def _calibrations(
             yield calibrate(experiment, start, guesses)
 
 
-def _best_of(free: Experiment, reached: Iterable[Fit]) -> Fit:
+def _best_of(free: Experiment, groups: Sequence[Iterable[Fit]]) -> Fit:
     """The most probable of some calibrations that predict well, judged by the noise that is assumed.
 
-    Random heat lets a course drift off, so that where the model lacks much, a fit which misses the temperatures by many
-    kelvins may be the most probable one. With less random heat the courses stay near.
+    A later group counts only if it comes clearly nearer to the temperatures. Random heat lets a course drift off, so
+    that where the model lacks much, a fit which misses the temperatures by many kelvins may be the most probable one.
+    With less random heat the courses stay near, but parameters stand in for what the model lacks.
     """
-    settled: list[tuple[float, Fit]] = []
-    for one in reached:  # a course that has not settled may look better than it is
-        with suppress(*NO_SOLUTION):
-            again = replace(one.experiment, filters=None).fit(one.z, iterations=0)
-            settled.append((_off_by(again), again))
-    if not settled:
+    settled: list[list[tuple[float, Fit]]] = []
+    for group in groups:
+        settled.append([])
+        for one in group:  # a course that has not settled may look better than it is
+            with suppress(*NO_SOLUTION):
+                again = replace(one.experiment, filters=None).fit(one.z, iterations=0)
+                settled[-1].append((_off_by(again), again))
+    if not any(settled):
         raise ArithmeticError("the simulation has no solution without model error")
-    farthest = FAR_OFF * min(off_K for off_K, _ in settled)
-    best = max((one for off_K, one in settled if off_K <= farthest), key=lambda one: one.log_evidence)
+    nearest = [min(off_K for off_K, _ in group) for group in settled if group]
+    first = next(group for group in settled if group and min(off for off, _ in group) < min(nearest) + NEARER_K)
+    farthest = FAR_OFF * min(off_K for off_K, _ in first)
+    best = max((one for off_K, one in first if off_K <= farthest), key=lambda one: one.log_evidence)
     return best if best.experiment.random_heat == AS_ASSUMED else free.fit(best.z, best.trajectories, iterations=0)
 
 
@@ -98,8 +134,12 @@ def refit_to_predict(fit: Fit, plain: Fit, apart: Collection[str] = ()) -> Fit:
     counting = without_channels(every, apart) if apart else every
     nominal = fit.z.copy()
     nominal[: len(plain.z)] = plain.z_in(every)
-    tried = product((counting, counting.with_random_heat(QUIET)), (fit.z, nominal))
-    found = _best_of(counting, _calibrations(tried, fit.trajectories))
+    quiet = counting.with_random_heat(QUIET)
+    starts, near = (fit.z, nominal), fit.trajectories
+    found = _best_of(counting, [
+        _as_estimated(fit, [counting, quiet], near),
+        *(_calibrations(product([one], starts), near) for one in (counting, quiet)),
+    ])  # fmt: skip
     if not apart:
         return found
     terms = {term.label: term for term in every.machine.terms}

@@ -14,6 +14,7 @@ from diagnosis.decision.answer import Answer, act_on_the_same
 from diagnosis.decision.posterior import KINDS, Expected, Judged, Posterior
 from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.fit import Experiment, Fit
+from diagnosis.engine.predict import Prediction
 from diagnosis.engine.scale import at_stated_size
 from diagnosis.forward.grid import too_short
 from diagnosis.forward.whitening import RandomHeat
@@ -23,6 +24,7 @@ from diagnosis.results.findings import estimates_of, finding_of, joint_estimate_
 from diagnosis.results.held_out import validate
 from diagnosis.results.instruments import sensors_and_inputs_of
 from diagnosis.results.locations import locations_of
+from diagnosis.results.mean_loss import mean_loss_of
 from diagnosis.results.notes import baseline_notes, limit_notes, ratio_notes
 from diagnosis.results.predicted_run import PredictedRun
 from diagnosis.results.predictions import Predicted
@@ -111,7 +113,9 @@ def assemble(
     inputs = setup.gearbox.network().inputs
     most_probable = valid.model.best if others is None else others.posterior.nothing
     believed = (most_probable.fit if most_probable else None) or calibration.fit
-    model = _calibrated(final, believed, plain, inputs, valid.model.best.effects if valid.model.best else ())
+    runs = valid.model.predicted.train
+    effects = valid.model.best.effects if valid.model.best else ()
+    model = _calibrated(final, runs["after"], believed, plain, inputs, effects)
     return Diagnosis(
         verdict=verdict,
         gearbox=setup.gearbox.name,
@@ -126,7 +130,7 @@ def assemble(
         faulty=faulty,
         terms=_terms(valid.model.best, final),
         known=known,
-        alone=_calibrated(plain, calibration.fit, plain, inputs),
+        alone=_calibrated(plain, runs["calibrated"], calibration.fit, plain, inputs),
         joint=joint_estimate_of(final),
         starts_at=experiment.starts_at,
         noise_K=setup.noise_K,
@@ -334,14 +338,17 @@ def _courses(setup: InferenceSetup, predicted: Predicted) -> tuple[PredictedRun,
 
 
 def _calibrated(
-    fit: Fit, believed: Fit, plain: Fit, inputs: Collection[str], effects: Sequence[Hypothesis] = ()
-) -> CalibratedModel:
+    fit: Fit, run: Sequence[Prediction], believed: Fit, plain: Fit, inputs: Collection[str],
+    effects: Sequence[Hypothesis] = (),
+) -> CalibratedModel:  # fmt: skip
     """Every usual parameter, the sensors and the inputs of a fit, without those of effects.
 
     How far a parameter is from its prior is that of the definition: that of one found is wider.
 
     Parameters
     ----------
+    run : sequence of Prediction
+        Of the recordings that were learnt from
     believed : Fit
         With model error in place; what it does not have is as in `fit`
     """
@@ -350,7 +357,8 @@ def _calibrated(
     found = {p.name for term in terms for p in term.parameters}
     usual = [one.parameter for one in fit.experiment.unknowns if one.parameter.name in {*stated} - found]
     values = estimates_of(fit)
-    estimates = {**values, **estimates_of(at_stated_size(believed))}
+    believed = at_stated_size(believed)
+    estimates = {**values, **estimates_of(believed)}
     sensors, true_inputs = sensors_and_inputs_of(fit, findings=[term.label for term in terms], inputs=inputs)
     return CalibratedModel(
         calibration=tuple(
@@ -358,7 +366,7 @@ def _calibrated(
                        estimate_stderr=sd, shift_in_sd=stated[p.name].z_of(estimate), unit=p.unit)
             for p in usual for (value, stderr), (estimate, sd) in [(values[p.name], estimates[p.name])]
         ),
-        sensors=sensors, true_inputs=true_inputs,
+        sensors=sensors, true_inputs=true_inputs, mean_loss=mean_loss_of(believed, fit, run),
     )  # fmt: skip
 
 

@@ -254,6 +254,15 @@ def _how_much_better(d: Diagnosis) -> tuple[str, ...]:
                 f"RMSE {name}{without}: {fits.before:.2f} K as delivered, {fits.calibrated:.2f} K calibrated"
                 f"{found}{learnt} (noise {d.noise_K:.2f} K)"
             )
+    if (loss := d.model.mean_loss) is not None:
+        apart = (
+            ": more than its error, so take no losses from that model; temperatures alone give ratios of heats, and a "
+            "measured loss would settle it"
+        ) if loss.is_far else ""  # fmt: skip
+        lines.append(
+            f"Mean total loss, not measured: {loss.estimate_W:.3g} ± {loss.stderr_W:.2g} W estimated, "
+            f"{loss.predicting_W:.3g} W in the model that predicts{apart}"
+        )
     if math.isfinite(d.left_out_K):
         lines.append(
             "What was learnt of model error is left out: with it held-out temperatures are missed by "

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, NamedTuple
 
 from diagnosis.decision.answer import Grade
+from diagnosis.results.mean_loss import MeanLoss
 from models.base.types import Array
 from models.correction.instruments import InputCorrection, SensorCorrection
 from models.quantities.quantities import is_total_loss
@@ -382,11 +383,14 @@ class CalibratedModel:
         How its sensors differ from the machine
     true_inputs : tuple of InputCorrection
         What it took the inputs to be
+    mean_loss : MeanLoss or None
+        None if a loss is measured
     """
 
     calibration: tuple[Calibrated, ...] = ()
     sensors: tuple[SensorCorrection, ...] = ()
     true_inputs: tuple[InputCorrection, ...] = ()
+    mean_loss: MeanLoss | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,0 +1,60 @@
+"""Mean total loss that recordings of temperatures alone tell of, and that of the model that predicts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnosis.engine.fit import Fit
+from diagnosis.engine.mean_loss import mean_loss
+from diagnosis.engine.predict import Prediction
+from models.quantities.quantities import is_total_loss
+
+FAR_SD = 2.0  # standard errors from the estimate, beyond which a model is not to be asked for losses
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeanLoss:
+    """Mean total loss over the tested recordings, which measure none: temperatures identify ratios of heats alone.
+
+    Attributes
+    ----------
+    estimate_W, stderr_W : float
+        With model error in place, so that the priors of heats, conductances and capacities have their say
+    predicting_W : float
+        Of the model that predicts: parameters may stand in for model error there
+    """
+
+    estimate_W: float
+    stderr_W: float
+    predicting_W: float
+
+    @property
+    def is_far(self) -> bool:
+        """True if the model that predicts is not to be asked for losses."""
+        return abs(self.predicting_W - self.estimate_W) > FAR_SD * self.stderr_W
+
+
+def mean_loss_of(believed: Fit, fit: Fit, run: Sequence[Prediction]) -> MeanLoss | None:
+    """Mean total loss as estimated, and of the model that predicts; None if one is measured.
+
+    Parameters
+    ----------
+    believed : Fit
+        With model error in place
+    fit : Fit
+        Of the model that predicts
+    run : sequence of Prediction
+        Of the recordings that were learnt from, by that model
+    """
+    if any(map(is_total_loss, believed.experiment.pieces[0].channels)):
+        return None
+    (estimate, slopes), is_loss = mean_loss(believed), fit.experiment.machine.model.is_loss
+    tested = [run[index] for index in believed.experiment.tested]
+    loss = np.concatenate([one.trajectory.balance.sources[:, is_loss].sum(axis=-1) for one in tested])
+    return MeanLoss(
+        estimate_W=estimate, stderr_W=float(np.sqrt(slopes @ believed.covariance @ slopes)),
+        predicting_W=float(np.average(loss, weights=np.concatenate([one.piece.steps for one in tested]))),
+    )  # fmt: skip
