@@ -2,23 +2,34 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from diagnosis.engine import to_predict
 from diagnosis.engine.fit import Experiment, Fit, calibrate
+from diagnosis.engine.mean_loss import mean_loss
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.to_predict import FAR_OFF, QUIET, calibrated_to_predict
 from diagnosis.forward.whitening import AS_ASSUMED
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
-from tests.unit.diagnosis.inference_example import recorded
+from tests.unit.diagnosis.inference_example import recorded, windage_ride
 
 
 @pytest.fixture(scope="module")
 def experiment(fzg: Gearbox) -> Experiment:
-    made = recorded(fzg, "made")
+    """With a measured loss."""
+    ride = recorded(fzg, "made")
+    made = windage_ride(fzg, ride.time, ride.inputs["speed"], ride.inputs["torque"], windage_W=0.0, seed=0)
     return prepare_experiment(fzg, [made], [made])[1]
+
+
+@pytest.fixture(scope="module")
+def of_temperatures(fzg: Gearbox) -> Fit:
+    made = recorded(fzg, "made")
+    return calibrate(prepare_experiment(fzg, [made], [made])[1])
 
 
 @pytest.fixture(scope="module")
@@ -72,3 +83,38 @@ def test_a_course_that_has_not_settled_does_not_count(
     assert unsettled.log_evidence > stuck.log_evidence
     monkeypatch.setattr(to_predict, "calibrate", lambda *_: stuck)
     np.testing.assert_array_equal(calibrated_to_predict(unsettled, stuck).z, stuck.z)
+
+
+def test_losses_stay_as_estimated_where_temperatures_allow_it(
+    of_temperatures: Fit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Temperatures alone hardly tell 10 % more of all losses from less cooling and less capacity."""
+    names = [unknown.parameter.name for unknown in of_temperatures.experiment.unknowns]
+    of_losses = [names.index(name) for name in ("mesh", "rolling", "churning", "seal", "bearing")]
+    estimated = replace(of_temperatures, z=of_temperatures.z.copy())
+    for index in of_losses:
+        unknown = estimated.experiment.unknowns[index]
+        estimated.z[index] = unknown.z_of(1.1 * unknown.value(float(of_temperatures.z[index])))
+    estimated = estimated.experiment.fit(estimated.z, iterations=0)
+    found = calibrated_to_predict(of_temperatures, estimated)
+    np.testing.assert_array_equal(found.z[of_losses], estimated.z[of_losses])
+    loss, slopes = mean_loss(found)
+    assert loss == pytest.approx(1.1 * mean_loss(of_temperatures)[0], rel=0.02)
+    assert set(np.flatnonzero(slopes).tolist()) >= set(of_losses) and slopes[names.index("h_air")] == 0.0
+    assert found.z[names.index("h_air")] > of_temperatures.z[names.index("h_air")] + 0.1  # the rest follows
+
+    held = tuple(estimated.z[of_losses])
+    off_K = to_predict.NEARER_K + 0.01
+    monkeypatch.setattr(to_predict, "_off_by", lambda one: off_K if tuple(one.z[of_losses]) == held else 0.0)
+    assert tuple(calibrated_to_predict(of_temperatures, estimated).z[of_losses]) != held
+
+
+def test_less_random_heat_counts_only_where_temperatures_come_clearly_nearer(
+    experiment: Experiment, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    usual = calibrate(experiment)
+    quiet = calibrate(experiment.with_random_heat(QUIET))
+    assert tuple(quiet.z) != tuple(usual.z)
+    for nearer_K, chosen in ((to_predict.NEARER_K - 0.01, usual), (to_predict.NEARER_K + 0.01, quiet)):
+        monkeypatch.setattr(to_predict, "_off_by", lambda one, d=nearer_K: d * (tuple(one.z) != tuple(quiet.z)))
+        np.testing.assert_allclose(calibrated_to_predict(usual, usual).z, chosen.z, atol=0.05)

@@ -13,6 +13,7 @@ from diagnosis.decision.settings import Settings
 from diagnosis.report import finding_charts
 from diagnosis.report.page import page
 from diagnosis.results.first_screen import EITHER, VERDICT_TEXT
+from diagnosis.results.mean_loss import MeanLoss
 from diagnosis.results.result import Diagnosis
 from diagnosis.results.result_parts import CalibratedModel, Change, Errors, Fits, Ranked, Rival, Switching
 from tests.unit.diagnosis.diagnosis_example import (
@@ -202,6 +203,17 @@ def test_parameters_far_from_their_priors_are_told_the_farthest_first() -> None:
            replace(seal, parameter="seal", estimate=0.319, shift_in_sd=-4.57))  # fmt: skip
     sure = told(replace(usual, model=CalibratedModel(calibration=(*far, *rest))), "How sure?")
     assert "Far from what was expected: seal = 0.319 (4.6 sd), bearing = 1.9 (3.2 sd)" in sure
+
+
+def test_a_loss_that_is_not_measured_is_given_with_its_error_and_with_what_predicts() -> None:
+    loss = MeanLoss(estimate_W=449.0, stderr_W=29.0, predicting_W=462.0)
+    usual = replace(missing_physics(), model=CalibratedModel(mean_loss=loss))
+    line = "Mean total loss, not measured: 449 ± 29 W estimated, 462 W in the model that predicts"
+    assert line in told(usual, "How much better?").splitlines()
+    assert usual.to_dict()["mean_loss"] == {"estimate_W": 449.0, "stderr_W": 29.0, "predicting_W": 462.0}
+    far = replace(usual, model=CalibratedModel(mean_loss=replace(loss, predicting_W=508.0)))
+    assert "508 W in the model that predicts: more than its error" in told(far, "How much better?")
+    assert "Mean total loss" not in str(missing_physics()) and missing_physics().to_dict()["mean_loss"] is None
 
 
 def test_every_likely_place_is_told_with_what_the_first_one_does() -> None:
