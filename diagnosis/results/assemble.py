@@ -46,6 +46,7 @@ from models.base.version import project_version
 from models.network.laws import Parameter
 from models.terms.term import Term
 
+BADLY = 2.0  # times the size that matters, which a calibrated model may be off for a "consistent"
 ENOUGH_VISIBLE = 0.1  # of the effects that were asked for, for a "consistent" that means something
 MOST_RANKED = 500
 PROBABLY = 0.5
@@ -108,7 +109,8 @@ def assemble(
     spoiled = spoiled_in(train, holdout, baselines=[r.name for r in setup.baseline],
                          least_K=settings.matters_K + setup.noise_K)  # fmt: skip
     unfit = bool(spoiled) or train.calibrated - train.before > setup.noise_K
-    verdict = verdict_of(posterior, [answer for answer, _ in reported], unseen, unfit=unfit)
+    badly = max(train.calibrated, holdout.calibrated) > BADLY * settings.matters_K + setup.noise_K
+    verdict = verdict_of(posterior, [answer for answer, _ in reported], unseen, unfit=unfit, badly=badly)
     location = locations_of(setup, posterior) if posterior.detected or verdict in NO_CLAIM else ()
     inputs = setup.gearbox.network().inputs
     most_probable = valid.model.best if others is None else others.posterior.nothing
@@ -231,11 +233,16 @@ def _distinct(found: Sequence[tuple[Answer, Finding]]) -> list[tuple[Answer, Fin
 
 
 def verdict_of(
-    posterior: Posterior, answers: Sequence[Answer], unseen: Sequence[NotDetectable], *, unfit: bool
+    posterior: Posterior, answers: Sequence[Answer], unseen: Sequence[NotDetectable], *, unfit: bool, badly: bool
 ) -> Verdict:
-    """The verdict; `unfit`: calibration made the model worse, of all or of some recordings.
+    """The verdict.
 
-    No calibration was found that suits them then, so that silence means nothing.
+    Parameters
+    ----------
+    unfit : bool
+        True if calibration made the model worse, of all or of some recordings: none was found that suits them
+    badly : bool
+        True if the calibrated model is far off: silence means nothing then
     """
     if posterior.parameter_outside:
         return "parameter_error"
@@ -244,7 +251,7 @@ def verdict_of(
     if not posterior.detected:
         asked = {one.effect.name for one in posterior.expected if one.effect.how == "always"}
         visible = 1.0 - len({one.mechanism for one in unseen}) / max(len(asked), 1)
-        return "insufficient_data" if asked and visible < ENOUGH_VISIBLE else "consistent"
+        return "insufficient_data" if badly or (asked and visible < ENOUGH_VISIBLE) else "consistent"
     effects = [answer.effect for answer in answers if answer.effect.term is not None]
     if not effects or any(answer.best.kind == "outside" or answer.effect.is_open for answer in answers):
         return "unexplained"

@@ -30,7 +30,7 @@ VERDICT_TEXT: Mapping[str, str] = {
     "missing_physics": "The machine shows physics that the model leaves out.",
     "sensor_fault": "A sensor, clock or recorded input is at fault, not the machine.",
     "unexplained": "Something is missing, and no name of the catalogue is certain enough.",
-    "insufficient_data": "Nothing stands out, but that means little: nearly everything could hide in these recordings.",
+    "insufficient_data": "Nothing stands out, but that means little: much could hide in these recordings.",
 }
 PARTLY = "Part of what is missing has a name; of the rest none is certain enough."
 LIKELY_TEXT: Mapping[str, str] = {  # of the same verdicts where no name is a claim
@@ -45,7 +45,6 @@ SIZES = {0.5: "half as large", 1.0: "as assumed", 2.0: "twice as large"}  # of m
 MOST_FAR = 3  # parameters far from their priors that the summary tells of
 MOST_UNSEEN = 6  # effects that the summary names of those that cannot be seen
 OF_DATE = ("since", "lasting")  # parameters that the date contains
-BADLY = 2.0  # times the size that matters, which a calibrated model may be off without a word
 OF_SWITCH = ("set_point", "band")  # parameters that the switching temperatures contain
 LONG_S = 7200.0  # times beyond are told in hours
 LITTLE_SPREAD = 0.05  # deviation between sessions that is not worth a word, in prior standard deviations
@@ -82,10 +81,14 @@ def first_screen_of(d: Diagnosis) -> tuple[tuple[str, tuple[str, ...]], ...]:
 
 def _missing(d: Diagnosis) -> str:
     if d.verdict == "insufficient_data":
-        hidden = len({one.mechanism for one in d.unseen})
+        hidden, (off_K, what) = len({one.mechanism for one in d.unseen}), _farthest(d)
+        why = (
+            f"the model fits this machine badly: calibrated, it is {off_K:.2f} K off what was {what}"
+            if off_K > d.settings.matters_K + d.noise_K else "the recordings are too short or too calm for them"
+        )  # fmt: skip
         return (
             f"Not decided: {hidden} effects could hide that change a temperature by {d.settings.matters_K:g} K "
-            "(--matters-K), because the recordings are too short or too calm for them or the model fits too badly."
+            f"(--matters-K), because {why}."
         )
     why = f"false-alarm rate of {100.0 * d.settings.false_alarm_rate:g} % asked for"
     if d.assumed.placebo is not None and d.threshold == d.assumed.placebo.log_e_value:
@@ -110,13 +113,7 @@ def _missing(d: Diagnosis) -> str:
             "wrong columns, other units, and a wrong definition."
         )
     where = " in what was learnt from" if d.missed else ""
-    off = max(((one.calibrated, what) for one, what in ((d.train, "learnt from"), (d.holdout, "held out"))
-               if not math.isnan(one.calibrated)), default=(0.0, ""))  # fmt: skip
-    doubt = (
-        f" But calibrated, the model is {off[0]:.2f} K off what was {off[1]}: it fits this machine badly, and an "
-        "effect may hide in that."
-    ) if off[0] > BADLY * d.settings.matters_K + d.noise_K else ""  # fmt: skip
-    return f"Nothing that these data show{where}: {reached}.{doubt}"
+    return f"Nothing that these data show{where}: {reached}."
 
 
 def _taken_back(d: Diagnosis) -> tuple[str, ...]:
@@ -130,6 +127,12 @@ def _taken_back(d: Diagnosis) -> tuple[str, ...]:
 def _cannot_be_fitted(d: Diagnosis) -> bool:
     """True if nothing was detected, but calibration made the model worse."""
     return d.verdict == "unexplained" and d.log_e_value <= d.threshold
+
+
+def _farthest(d: Diagnosis) -> tuple[float, str]:
+    """Largest error of the calibrated model, and of what."""
+    errors = ((d.train.calibrated, "learnt from"), (d.holdout.calibrated, "held out"))
+    return max((error for error in errors if not math.isnan(error[0])), default=(0.0, ""))
 
 
 def _in_what(d: Diagnosis) -> str:

@@ -14,11 +14,16 @@ from diagnosis.results.result_parts import Errors, spoiled_in
 from tests.unit.diagnosis.diagnosis_example import consistent
 
 
-@pytest.mark.parametrize(("unfit", "verdict"), [(False, "consistent"), (True, "unexplained")])
-def test_a_model_that_calibration_makes_worse_is_not_consistent(unfit: bool, verdict: str) -> None:
+@pytest.mark.parametrize(("unfit", "badly", "verdict"), [
+    (False, False, "consistent"), (True, False, "unexplained"), (False, True, "insufficient_data"),
+    (True, True, "unexplained"),
+])  # fmt: skip
+def test_a_model_that_calibration_makes_worse_or_leaves_far_off_is_not_consistent(
+    unfit: bool, badly: bool, verdict: str
+) -> None:
     nothing = Judged(effects=(), log_bayes=0.0, error_class=error_classes()[0])
     silent = Posterior(nothing=nothing, judged=(), log_e=-2.0, threshold=10.0, class_threshold=5.0, rule=rule())
-    assert verdict_of(silent, (), (), unfit=unfit) == verdict
+    assert verdict_of(silent, (), (), unfit=unfit, badly=badly) == verdict
 
 
 def test_what_to_check_then_is_told() -> None:
