@@ -166,7 +166,7 @@ def _print_notes(recordings: Sequence[Recording]) -> None:
     for note in notes[:MOST_NOTES]:
         console.err.print(f"note: {note}")
     if len(notes) > MOST_NOTES:
-        console.err.print(f"{len(notes) - MOST_NOTES} more notes stand in the report")
+        console.err.print(f"and {len(notes) - MOST_NOTES} more: the report lists all notes")
 
 
 def _check_options(recordings: tuple[str, ...], others: tuple[str, ...], dask: str | None, *, fleet: bool) -> None:

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 
 SUFFIX = {"python": "", "native": "_native", "native_fmi3": "_native_fmi3"}  # of the files' names
 LABEL = {"python": "python", "native": "native", "native_fmi3": "native FMI 3.0"}  # of the kinds, for people
+POOR_LOSS = 0.02  # of the total loss, mean over the reference cycle
 VERSIONS = {"2": ("native",), "3": ("native_fmi3",), "both": ("native", "native_fmi3")}  # native kinds by --fmi
 
 
@@ -281,6 +282,7 @@ def build(
                 driven = drive_fmu(path, cycle, initial=COLD_START, progress=partial(progress, step))
             progress("drawing the plots")
             cycles[path.name] = cycle_errors(driven, full)
+            notes += _poor(path.name, cycles[path.name])
             write_table(stage / f"drive_cycle{SUFFIX[kind]}.csv", driven)
             title = f"{gearbox.name}\n600 s reference cycle, {LABEL[kind]} FMU and full model"
             plot = stage / f"drive_cycle{SUFFIX[kind]}.png"
@@ -294,6 +296,14 @@ def build(
         made = sorted(path.relative_to(stage) for path in stage.rglob("*") if path.is_file())
     files = tuple(folder / path for path in made)
     return replace(report, files=files, notes=(*report.notes, *_left_from_before(folder, files)))
+
+
+def _poor(fmu: str, errors: CycleErrors) -> list[str]:
+    """A note if the losses of an FMU are far from those of the full model on average."""
+    if errors.loss_mean is None or errors.loss_mean < POOR_LOSS:
+        return []
+    advice = "train larger networks (--preset default) or on more points (--samples) before you use its losses"
+    return [f"{fmu}: the total loss is {errors.loss_mean:.1%} off the full model on average; {advice}"]
 
 
 def _at_rest(network: ThermalNetwork, full: Mapping[str, Array]) -> list[str]:

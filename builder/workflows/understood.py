@@ -45,7 +45,16 @@ def understood(gearbox: Gearbox) -> list[Grid]:
     tables = [_nodes(gearbox, network), _links(gearbox, network), _inputs(network), _heats(gearbox, network)]
     if "oil" in {part.name for part in network.parts}:
         tables.append(_oil(gearbox))
-    return tables
+    return tables if gearbox.is_parametric else [*tables, _gears(gearbox)]
+
+
+def _gears(gearbox: Gearbox) -> Grid:
+    stage, level = gearbox.stage[0], gearbox.oil.level_below_axis
+    rows = [
+        [name, f"{2e3 * r_a:.1f}", f"{1e3 * (r_a - level):.1f}" if r_a > level else "not at all"]
+        for name, r_a in zip(stage.names, stage.pair().r_a, strict=True)
+    ]
+    return Grid(f"Gears; oil {1e3 * level:g} mm below their axes", ["gear", "tip diameter, mm", "dips, mm"], rows)
 
 
 def conductances(gearbox: Gearbox, network: ThermalNetwork) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""Mean total loss that recordings of temperatures alone tell of, and that of the model that predicts."""
+"""Mean total loss where recordings measure none, as estimated and of the model that predicts."""
 
 from __future__ import annotations
 

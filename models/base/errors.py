@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 from pathlib import Path
 
+SHORTEST_PART = 3  # letters of a part of a name
 LONGEST_SHOWN = 60
 
 
@@ -58,18 +59,22 @@ class Problems:
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """Return ``"; did you mean 'x'?"`` for the nearest known name, or a list of what is known.
+    """Return ``"; did you mean 'x'?"`` for the nearest known name or those that hold it, or a list of what is known.
 
     Examples
     --------
     >>> did_you_mean("facewidth_mm", ["face_width_mm", "module_mm"])
     "; did you mean 'face_width_mm'?"
+    >>> did_you_mean("fan", ["fan_thermostat", "windage"])
+    "; did you mean 'fan_thermostat'?"
     >>> did_you_mean("qqq", ["b", "a"])
     '; known are: a, b'
     """
     names = sorted(known)
     close = get_close_matches(name, names, n=1)
-    return f"; did you mean '{close[0]}'?" if close else f"; known are: {', '.join(names)}"
+    if not close and len(name) >= SHORTEST_PART:
+        close = [known for known in names if name in known]
+    return f"; did you mean {' or '.join(map(repr, close))}?" if close else f"; known are: {', '.join(names)}"
 
 
 def shown(value: object) -> str:

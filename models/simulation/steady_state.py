@@ -122,7 +122,10 @@ def _inputs(
     for name in given:
         if name in network.derived:
             sources = {s.name for s in network.derived[name].free_symbols} & set(network.inputs)
-            raise InputError(f"{name!r} follows from {', '.join(sorted(sources))} here; give that in its place")
+            needed = ", ".join(f"{source!r}: ..." for source in sorted(sources - {"speed"}))
+            raise InputError(
+                f"{name!r} follows from {', '.join(sorted(sources))} here; give inputs = {{{needed}}} in its place"
+            )
         if name not in network.inputs:
             raise InputError(f"{name!r} is not an input of this network{did_you_mean(name, network.inputs)}")
     given = {"speed": 0.0, "torque": 0.0} | given

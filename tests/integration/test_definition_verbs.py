@@ -63,4 +63,4 @@ def test_the_schema_is_json_on_the_terminal_and_in_a_file(
 def test_what_can_be_named_is_listed(run_cli: RunCli, capsys: pytest.CaptureFixture[str]) -> None:
     assert run_cli("check", "--known") == 0
     shown = capsys.readouterr().out
-    assert all(name in shown for name in ("ISO_VG_220", "NU 207", "la_haute_borne"))
+    assert all(name in shown for name in ("ISO_VG_220", "204 to 220", "la_haute_borne"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from zipfile import ZipFile
@@ -33,6 +34,9 @@ def test_errors_over_a_cycle_are_those_of_the_fmu_against_the_model() -> None:
     assert errors.temperature_K == {"oil": 0.5, "mesh": 3.0}
     assert errors.loss_mean == pytest.approx(0.01)
     assert errors.loss_worst == pytest.approx(0.02)
+    assert builder_build._poor("own.fmu", errors) == []
+    (note,) = builder_build._poor("own.fmu", replace(errors, loss_mean=0.093))
+    assert note.startswith("own.fmu: the total loss is 9.3% off the full model on average; train larger networks")
 
 
 def test_an_fmu_that_cannot_run_here_is_built_and_that_is_told(
