@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 import sympy as sp
 
-from diagnosis.engine.fit import Fit
+from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.unknown import NetworkParameter, Unknown
 from models.base.types import Array
 from models.network.laws import symbol
@@ -36,14 +36,19 @@ def scale_direction(network: ThermalNetwork, unknowns: Sequence[Unknown]) -> Arr
     ])  # fmt: skip
 
 
+def is_of_temperatures(experiment: Experiment) -> bool:
+    """True if no loss is measured: temperatures identify ratios of heats, conductances and capacities alone."""
+    return not any(map(is_total_loss, experiment.pieces[0].channels))
+
+
 def at_stated_size(fit: Fit) -> Fit:
     """A fit with the common factor as the definition has it, where temperatures do not know it.
 
     Model error, whose size is stated in watts, may have moved it: it is larger in a smaller machine.
     """
     experiment = fit.experiment
-    network, channels = experiment.machine.model.network, experiment.pieces[0].channels
-    if any(map(is_total_loss, channels)) or not all_sizes_are_unknown(network, experiment.unknowns):
+    network = experiment.machine.model.network
+    if not (is_of_temperatures(experiment) and all_sizes_are_unknown(network, experiment.unknowns)):
         return fit
     direction = scale_direction(network, experiment.unknowns)
     return replace(fit, z=fit.z - direction * float(fit.z @ direction) / float(direction @ direction))

@@ -10,7 +10,7 @@ from itertools import product
 import numpy as np
 
 from diagnosis.engine.fit import NO_SOLUTION, NOISE_ALONE, Experiment, Fit, Guess, calibrate
-from diagnosis.engine.mean_loss import mean_loss
+from diagnosis.engine.mean_loss import mean_loss, rests_on_the_definition
 from diagnosis.engine.set_apart import without_channels
 from diagnosis.engine.unknown import NetworkParameter, SensorBias, SensorLag, TermParameter, Unknown
 from diagnosis.forward.whitening import AS_ASSUMED, RandomHeat
@@ -53,12 +53,12 @@ def calibrated_to_predict(plain: Fit, with_error: Fit, start: Array | None = Non
 def _as_estimated(
     with_error: Fit, experiments: Sequence[Experiment], guesses: Sequence[Guess] | None = None
 ) -> Iterator[Fit]:
-    """Calibrations, each from the one before, with all losses as estimated with model error; none if one is measured.
+    """Calibrations, each from the one before, with all losses as estimated with model error.
 
-    Temperatures identify ratios of heats, conductances and capacities: by noise alone their common size would stand in
-    for what the model lacks.
+    None if a loss is measured, or nothing in the definition fixes its size. Temperatures identify ratios of heats,
+    conductances and capacities: by noise alone their common size would stand in for what the model lacks.
     """
-    if any(map(is_total_loss, with_error.experiment.pieces[0].channels)):
+    if not rests_on_the_definition(with_error.experiment):
         return
     loss, slopes = mean_loss(with_error)
     held = [

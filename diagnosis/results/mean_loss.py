@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.engine.fit import Fit
-from diagnosis.engine.mean_loss import mean_loss
+from diagnosis.engine.mean_loss import mean_loss, rests_on_the_definition
 from diagnosis.engine.predict import Prediction
-from models.quantities.quantities import is_total_loss
 
 FAR_SD = 2.0  # standard errors from the estimate, beyond which a model is not to be asked for losses
 
@@ -38,7 +37,7 @@ class MeanLoss:
 
 
 def mean_loss_of(believed: Fit, fit: Fit, run: Sequence[Prediction]) -> MeanLoss | None:
-    """Mean total loss as estimated, and of the model that predicts; None if one is measured.
+    """Mean total loss as estimated, and of the model that predicts; None if one is measured, or nothing is known of it.
 
     Parameters
     ----------
@@ -49,7 +48,7 @@ def mean_loss_of(believed: Fit, fit: Fit, run: Sequence[Prediction]) -> MeanLoss
     run : sequence of Prediction
         Of the recordings that were learnt from, by that model
     """
-    if any(map(is_total_loss, believed.experiment.pieces[0].channels)):
+    if not rests_on_the_definition(believed.experiment):
         return None
     (estimate, slopes), is_loss = mean_loss(believed), fit.experiment.machine.model.is_loss
     tested = [run[index] for index in believed.experiment.tested]
