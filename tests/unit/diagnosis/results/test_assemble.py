@@ -335,9 +335,21 @@ def test_detected_without_an_answer_is_unexplained(
     assert {finding.grade for finding in correction_of(found, fzg).findings} == {"learnt"}
 
 
-def test_a_parameter(assembled: Assemble, prepared: Prepared) -> None:
+@pytest.fixture
+def assembled_alike(prepared: Prepared, calibration: Calibration) -> Assemble:
+    """Held out is what was learnt: other readings would contradict what is invented here."""
+    setup, experiment, plain = prepared
+    alike = replace(setup, holdout=setup.recordings, held_out=setup.learnt)
+
+    def result(posterior: Posterior, answers: list[Answer]) -> Diagnosis:
+        return assemble(alike, experiment, posterior, answers, plain=plain, calibration=calibration)
+
+    return result
+
+
+def test_a_parameter(assembled_alike: Assemble, prepared: Prepared) -> None:
     """Out of its prior by five standard deviations: the same unknown with a wider prior."""
-    setup, _, plain = prepared
+    plain, assembled = prepared[2], assembled_alike
     name = "h_air"
     index = next(i for i, u in enumerate(plain.experiment.unknowns) if u.parameter.name == name)
     old = cast(NetworkParameter, plain.experiment.unknowns[index])
@@ -366,17 +378,12 @@ def test_a_parameter(assembled: Assemble, prepared: Prepared) -> None:
         "most like: parameter h_air" in unsure
         and "Several may be off, or the definition lacks a part or a path" in unsure
     )
-    claim = read_answer(found.to_dict(), setup.gearbox).claims[0]
+    claim = read_answer(found.to_dict(), prepared[0].gearbox).claims[0]
     assert claim.sign == -1 and "air" in claim.nodes
 
 
-def test_a_sensor_fault(prepared: Prepared, calibration: Calibration, windage: Judged, fzg: Gearbox) -> None:
-    setup, experiment, plain = prepared
-    alike = replace(setup, holdout=setup.recordings, held_out=setup.learnt)  # others would contradict this fault
-
-    def assembled(posterior: Posterior, answers: list[Answer]) -> Diagnosis:
-        return assemble(alike, experiment, posterior, answers, plain=plain, calibration=calibration)
-
+def test_a_sensor_fault(assembled_alike: Assemble, prepared: Prepared, windage: Judged, fzg: Gearbox) -> None:
+    (setup, _, plain), assembled = prepared, assembled_alike
     effect = replace(effect_of(setup, plain, "sensor_bias", "oil"), log_prior=-3.0)
     assert effect.term is not None
     fit = _fit_with(plain, effect, {effect.term.strength.name: 3.0})

@@ -183,7 +183,7 @@ def test_torque_from_an_electrical_power_is_that_torque() -> None:
         found = network.simulate(
             given | {"P_electrical": power}, losses=by_power.loss_laws(), initial=40.0, parameters={"efficiency": eta}
         )
-        with pytest.raises(InputError, match="'torque' follows from P_electrical, speed here; give that"):
+        with pytest.raises(InputError, match="'torque' follows from P_electrical, speed here; give inputs"):
             network.steady_state(losses=by_power.loss_laws(), speed=1500.0, torque=290.0)
         # Power over speed is not straight between the rows where the torque is.
         assert found.temperatures["oil"] == pytest.approx(expected.temperatures["oil"], abs=0.01)
