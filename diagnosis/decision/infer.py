@@ -42,7 +42,7 @@ from diagnosis.engine.outside import judge_outside
 from diagnosis.engine.refit import refit
 from diagnosis.engine.scan import Scan, scan
 from diagnosis.engine.sessions import fit_over_sessions
-from diagnosis.engine.switch_grid import held_numbers, with_refined_switches
+from diagnosis.engine.switch_grid import held_numbers, switch_numbers, with_refined_switches
 from models.base.progress import Progress, silent
 
 StartOf = Callable[[ErrorClass], Fit]  # where fits with model error of a class begin
@@ -196,7 +196,10 @@ def _with_course_of(calibration: Calibration, best: Judged, one: Judged) -> Judg
 
 
 def _worth_a_fit(found: Scanned) -> list[int]:
-    """Places of the best candidates by name, with a second place where it is near."""
+    """Places of the best candidates by name, with a second place where it is near, and of every control that switches.
+
+    A straight line from a machine without it, calibrated far off, does not see a control that switches.
+    """
     of_name: dict[str, list[int]] = {}
     for index in found.order:
         mine = of_name.setdefault(found.candidates[index].name, [])
@@ -206,7 +209,12 @@ def _worth_a_fit(found: Scanned) -> list[int]:
             mine.append(index)
     worth = max(WORTH, WORTH_SHARE * float(found.log_bayes.max(initial=0.0)))
     every = [index for mine in list(of_name.values())[:RACED] for index in mine]
-    return [index for index in every if found.log_bayes[index] > worth]
+    controls: dict[str, int] = {}
+    for index in found.order:
+        one = found.candidates[index]
+        if one.how == "always" and one.term is not None and switch_numbers(one.term):
+            controls.setdefault(one.name, index)
+    return list(dict.fromkeys([*(index for index in every if found.log_bayes[index] > worth), *controls.values()]))
 
 
 def _refitted(fit: Fit, found: Scanned, index: int, iterations: int) -> Judged:

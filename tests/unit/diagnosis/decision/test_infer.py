@@ -46,7 +46,7 @@ from diagnosis.results.findings import heats_of, values_of
 from models.assembly.gearbox import Gearbox
 from models.base.progress import silent
 from models.base.types import Array
-from models.mechanisms import CATALOGUE, Placed
+from models.mechanisms import CATALOGUE, Placed, Scale
 from models.network.laws import Parameter, symbol
 from models.terms.term import Form, Term
 from tests.unit.diagnosis.inference_example import acting, recorded
@@ -366,6 +366,16 @@ def test_a_name_is_fitted_at_its_best_place_and_at_a_near_one() -> None:
     chosen = _worth_a_fit(scanned_as(candidates, log_bayes))
     assert chosen == [0, 1, 3] and PLACES == 2
     assert not _worth_a_fit(scanned_as(candidates, np.full(5, 0.9)))  # nothing explains anything
+
+
+def test_what_switches_is_fitted_whatever_a_straight_line_says_of_it(fzg: Gearbox) -> None:
+    """At its best place: a fan that a calibrated machine had to live with is far from any straight line."""
+    network, scale = fzg.network(), Scale.of(fzg, speed=3300.0, torque=150.0)
+    placed = [hypothesis_of(one) for name in ("cooler_thermostat", "windage", "fan_thermostat")
+              for one in CATALOGUE[name].placed(network, scale)]  # fmt: skip
+    chosen = _worth_a_fit(scanned_as(placed, np.linspace(-3.0, -2.0, len(placed))))
+    assert sorted({placed[index].name for index in chosen}) == ["cooler_thermostat", "fan_thermostat"]
+    assert len(chosen) == 2
 
 
 def test_names_share_the_race() -> None:
