@@ -19,7 +19,9 @@ from models.quantities.quantities import is_total_loss
 from models.terms.term import Term
 
 QUIET = RandomHeat(heat=0.1, wander=0.1)  # times the random heat that is assumed
-NEARER_K = 0.1  # by which temperatures have to come nearer, before parameters may stand in for what the model lacks
+# By which temperatures have to come nearer before parameters may stand in for what the model lacks: with less random
+# heat; with free losses as well, by what thermometers are usually off.
+NEARER_K, LOSSES_K = 0.1, 0.3
 FAR_OFF = 2.0  # times the least error of the temperatures, beyond which a fit predicts too badly to be chosen
 LEAST_SHARE = 1e-6  # of the mean loss that an unknown changes per prior standard deviation
 
@@ -43,11 +45,11 @@ def calibrated_to_predict(plain: Fit, with_error: Fit, start: Array | None = Non
     """
     free = replace(plain.experiment, filters=None)
     quiet = free.with_random_heat(QUIET)
-    return _best_of(free, [
-        _as_estimated(with_error, [free, quiet]),
-        [plain, *_calibrations([(free, with_error.z)])],
-        _calibrations([(quiet, start)]),
-    ])  # fmt: skip
+    return _best_of(free, {
+        LOSSES_K: _as_estimated(with_error, [free, quiet]),
+        NEARER_K: [plain, *_calibrations([(free, with_error.z)])],
+        0.0: _calibrations([(quiet, start)]),
+    })  # fmt: skip
 
 
 def _as_estimated(
@@ -82,24 +84,25 @@ def _calibrations(
             yield calibrate(experiment, start, guesses)
 
 
-def _best_of(free: Experiment, groups: Sequence[Iterable[Fit]]) -> Fit:
+def _best_of(free: Experiment, groups: Mapping[float, Iterable[Fit]]) -> Fit:
     """The most probable of some calibrations that predict well, judged by the noise that is assumed.
 
-    A later group counts only if it comes clearly nearer to the temperatures. Random heat lets a course drift off, so
-    that where the model lacks much, a fit which misses the temperatures by many kelvins may be the most probable one.
-    With less random heat the courses stay near, but parameters stand in for what the model lacks.
+    The first group counts that comes as near to the temperatures as the best one, but for its allowance [K]. Random
+    heat lets a course drift off, so that where the model lacks much, a fit which misses the temperatures by many kelvins
+    may be the most probable one. With less random heat the courses stay near, but parameters stand in for what the
+    model lacks.
     """
-    settled: list[list[tuple[float, Fit]]] = []
-    for group in groups:
-        settled.append([])
+    settled: dict[float, list[tuple[float, Fit]]] = {allowed_K: [] for allowed_K in groups}
+    for allowed_K, group in groups.items():
         for one in group:  # a course that has not settled may look better than it is
             with suppress(*NO_SOLUTION):
                 again = replace(one.experiment, filters=None).fit(one.z, iterations=0)
-                settled[-1].append((_off_by(again), again))
-    if not any(settled):
+                settled[allowed_K].append((_off_by(again), again))
+    nearest = min((off_K for group in settled.values() for off_K, _ in group), default=np.inf)
+    first = next((group for allowed_K, group in settled.items()
+                  if any(off_K <= nearest + allowed_K for off_K, _ in group)), None)  # fmt: skip
+    if first is None:
         raise ArithmeticError("the simulation has no solution without model error")
-    nearest = [min(off_K for off_K, _ in group) for group in settled if group]
-    first = next(group for group in settled if group and min(off for off, _ in group) < min(nearest) + NEARER_K)
     farthest = FAR_OFF * min(off_K for off_K, _ in first)
     best = max((one for off_K, one in first if off_K <= farthest), key=lambda one: one.log_evidence)
     return best if best.experiment.random_heat == AS_ASSUMED else free.fit(best.z, best.trajectories, iterations=0)
@@ -136,10 +139,11 @@ def refit_to_predict(fit: Fit, plain: Fit, apart: Collection[str] = ()) -> Fit:
     nominal[: len(plain.z)] = plain.z_in(every)
     quiet = counting.with_random_heat(QUIET)
     starts, near = (fit.z, nominal), fit.trajectories
-    found = _best_of(counting, [
-        _as_estimated(fit, [counting, quiet], near),
-        *(_calibrations(product([one], starts), near) for one in (counting, quiet)),
-    ])  # fmt: skip
+    found = _best_of(counting, {
+        LOSSES_K: _as_estimated(fit, [counting, quiet], near),
+        NEARER_K: _calibrations(product([counting], starts), near),
+        0.0: _calibrations(product([quiet], starts), near),
+    })  # fmt: skip
     if not apart:
         return found
     terms = {term.label: term for term in every.machine.terms}

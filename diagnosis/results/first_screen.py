@@ -263,8 +263,8 @@ def _how_much_better(d: Diagnosis) -> tuple[str, ...]:
             "measured loss would settle it"
         ) if loss.is_far else ""  # fmt: skip
         lines.append(
-            f"Mean total loss, not measured: {loss.estimate_W:.3g} ± {loss.stderr_W:.2g} W estimated, "
-            f"{loss.predicting_W:.3g} W in the model that predicts{apart}"
+            f"Mean total loss, not measured: {with_error(loss.estimate_W, loss.stderr_W)} W estimated, "
+            f"{number(loss.predicting_W)} W in the model that predicts{apart}"
         )
     if math.isfinite(d.left_out_K):
         lines.append(
