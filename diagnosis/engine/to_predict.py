@@ -88,9 +88,9 @@ def _best_of(free: Experiment, groups: Mapping[float, Iterable[Fit]]) -> Fit:
     """The most probable of some calibrations that predict well, judged by the noise that is assumed.
 
     The first group counts that comes as near to the temperatures as the best one, but for its allowance [K]. Random
-    heat lets a course drift off, so that where the model lacks much, a fit which misses the temperatures by many kelvins
-    may be the most probable one. With less random heat the courses stay near, but parameters stand in for what the
-    model lacks.
+    heat lets a course drift off, so that where the model lacks much, a fit which misses the temperatures by kelvins may
+    be the most probable one. With less random heat the courses stay near, but parameters stand in for what the model
+    lacks.
     """
     settled: dict[float, list[tuple[float, Fit]]] = {allowed_K: [] for allowed_K in groups}
     for allowed_K, group in groups.items():

@@ -13,6 +13,7 @@ from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.predict import overall_rmse, rmse
 from diagnosis.engine.prepare import held_out_experiment
+from diagnosis.engine.switch_grid import switch_numbers
 from diagnosis.engine.to_predict import refit_to_predict
 from diagnosis.forward.whitening import RandomHeat
 from diagnosis.results.predictions import Predicted, Predictions, predict_recordings, temperatures
@@ -101,6 +102,7 @@ def validate(
         contradicted = holdout.contradict(predicted.holdout_gain, setup.noise_K, posterior.class_threshold)
         if best is not None and best.error_class.is_large and all(one.how == "always" for one in best.effects):
             contradicted |= predicted.holdout_gain < posterior.rule.confirmed
+        contradicted |= best is not None and _switches_for_nothing(best, holdout)
         return PredictingModel(best=best, predicted=predicted, train=train, holdout=holdout,
                                contradicted=contradicted and not faulty)  # fmt: skip
 
@@ -125,6 +127,15 @@ def validate(
                         holdout=replace(model.holdout, found=holdout.found))  # fmt: skip
     return Validated(posterior=posterior, answers=answers, best=best, log_score_gain=gain, contradicted=contradicted,
                       model=model, without_second=without_second, refuted=refuted)  # fmt: skip
+
+
+def _switches_for_nothing(best: Judged, holdout: Fits) -> bool:
+    """True if an explanation has a control that switches, with which held-out temperatures are no nearer.
+
+    It has so many numbers and minima that it can follow what comes and goes for another reason.
+    """
+    switches = any(effect.term is not None and switch_numbers(effect.term) for effect in best.effects)
+    return switches and holdout.after >= holdout.calibrated
 
 
 def _best(posterior: Posterior, answers: Sequence[Answer]) -> Judged | None:
