@@ -443,6 +443,17 @@ class Fit:
 def calibrate(
     experiment: Experiment, z: Array | None = None, guesses: Sequence[Guess] | None = None, held: Sequence[int] = ()
 ) -> Fit:
-    """The unknowns from a start: a first fit chooses the noise filters, a second one is judged by them."""
+    """The unknowns from a start: a first fit chooses the noise filters, a second one is judged by them.
+
+    Parameters
+    ----------
+    z, guesses, held
+        See :meth:`Experiment.fit`
+
+    Raises
+    ------
+    ArithmeticError
+        If there is no solution where it should start.
+    """
     first = experiment.fit(z, guesses, iterations=FIRST_ITERATIONS, held=held)
     return experiment.with_filters(first.parts).fit(first.z, first.trajectories, held=held)

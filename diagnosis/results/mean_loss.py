@@ -37,7 +37,7 @@ class MeanLoss:
 
 
 def mean_loss_of(believed: Fit, fit: Fit, run: Sequence[Prediction]) -> MeanLoss | None:
-    """Mean total loss as estimated, and of the model that predicts; None if one is measured, or nothing is known of it.
+    """Mean total loss as estimated, and of the model that predicts; None if one is measured or none can be known.
 
     Parameters
     ----------

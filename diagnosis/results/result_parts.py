@@ -384,7 +384,7 @@ class CalibratedModel:
     true_inputs : tuple of InputCorrection
         What it took the inputs to be
     mean_loss : MeanLoss or None
-        None if a loss is measured
+        None if a loss is measured, or nothing in the definition fixes its size
     """
 
     calibration: tuple[Calibrated, ...] = ()
