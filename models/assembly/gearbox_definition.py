@@ -110,7 +110,9 @@ class Definition(Section):
     def _tables_agree(self) -> Self:
         faults = [*_duplicate_names(self), *_unknown_names(self)]
         # What follows reads the tables by their names.
-        faults = faults or [*_load_shares(self), *_shafts_in_gears(self), *_oil_level(self), *_oil_volume(self)]
+        faults = faults or [
+            *_load_shares(self), *_axial_loads(self), *_shafts_in_gears(self), *_oil_level(self), *_oil_volume(self),
+        ]  # fmt: skip
         if faults:
             raise ValueError("\n".join(faults))
         return self
@@ -166,6 +168,21 @@ def _load_shares(definition: Definition) -> Iterator[str]:
             yield f"bearing: none is on the shaft '{shaft.name}'"
         elif abs(sum(shares) - 1.0) > SHARE_TOLERANCE:
             yield f"bearing: load_share of the bearings on '{shaft.name}' sum to {sum(shares):g}, not to 1"
+
+
+def _axial_loads(definition: Definition) -> Iterator[str]:
+    """Refuse shafts of helical gears whose axial force no bearing can take, or several would."""
+    angle = definition.stage[0].helix_angle_deg
+    for shaft in definition.shaft if angle > 0.0 else ():
+        locating = [bearing for bearing in definition.bearing if bearing.shaft == shaft.name and bearing.locating]
+        if len(locating) != 1:
+            yield (
+                f"bearing: {len(locating) or 'none'} of those on '{shaft.name}' {'are' if locating else 'is'} "
+                f"locating; gears of helix_angle_deg = {angle:g} push along their shafts: set locating = true for the "
+                "one bearing of each shaft that takes it (a pair that takes one sense each counts as one)"
+            )
+        elif (fault := locating[0].axial_fault()) is not None:
+            yield f"bearing '{locating[0].name}'.locating: {fault}"
 
 
 def _shafts_in_gears(definition: Definition) -> Iterator[str]:

@@ -245,8 +245,9 @@ class _Builder:
         omega = Max(self.speed, SPEED_FLOOR_RPM) * RPM
         E_red = reduced_modulus(steel.youngs_modulus, steel.poisson, steel.youngs_modulus, steel.poisson)
         b_H = sp.sqrt(8.0 * torque / (pair.r_b[0] * pair.b) * pair.rho_red_C / (np.pi * E_red))
+        line, across = pair.b / np.cos(pair.beta_b), pair.T1C * np.cos(pair.beta_b)
         k, chi = steel.conductivity_W_mK, steel.conductivity_W_mK / (steel.density_kg_m3 * steel.specific_heat_J_kgK)
-        return 2.0 * b_H * pair.b * k / 1.06 * sp.sqrt(omega * pair.T1C / (chi * b_H))
+        return 2.0 * b_H * line * k / 1.06 * sp.sqrt(omega * across / (chi * b_H))
 
     def _shaft_links(self) -> Iterator[Link]:
         for shaft in self.gearbox.shaft:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
@@ -12,11 +13,14 @@ from models.quantities.definition_units import between
 LARGEST_RING_RATIO = 5.0  # outside diameter over bore; the largest of ISO 15, from memory, is 4 (634: 16 over 4 mm)
 # Constants of SKF's friction model by type of bearing: those that a file may leave out, and that of sliding under a
 # radial load, which it gives by the series. SKF, "Rolling bearings", 2016; mineral oil.
+# S1 of rollers, which acts on an axial load, is 0.16 or 0.17 in all series with a cage.
 OF_TYPE: dict[str, dict[str, float]] = {
     "cylindrical_roller": {"K_Z": 5.1, "K_L": 0.65, "mu_EHL": 0.02},
     "deep_groove_ball": {"K_Z": 3.1, "mu_EHL": 0.05},
 }
 SLIDING_OF_TYPE = {"cylindrical_roller": "S2", "deep_groove_ball": "S1"}
+FLANGE_SLIDING = 0.16
+NO_FLANGE = re.compile(r"\s*NU?\s*\d")  # N and NU let the shaft move
 
 
 class Bearing(Section):
@@ -33,7 +37,7 @@ class Bearing(Section):
     model: Literal["skf"]
     R1: Annotated[float, between(1e-8, 1e-4)]
     S1: Annotated[float, between(1e-5, 1.0)] | None = None
-    S2: Annotated[float, between(1e-5, 1.0)] | None = None
+    S2: Annotated[float, between(1e-5, 1000.0)] | None = None
     K_rs: Annotated[float, between(0.0, 1e-6)] = 3e-8
     K_Z: Annotated[float, between(1.0, 10.0), Field(default=None)]  # these three by the type where they are left out
     K_L: Annotated[float, between(0.1, 2.0)] | None = None
@@ -42,6 +46,8 @@ class Bearing(Section):
     oil_level_mm: Annotated[float, between(0.0, 1000.0)] | None = None
     temperature: Literal["mean", "skf_outlet"] = "mean"
     load_share: Annotated[float, between(0.0, 1.0)]
+    locating: bool | None = None  # none, not false, so that files without helical gears keep their hash
+    static_load_kN: Annotated[float, between(0.1, 1e4)] | None = None
     drag: Literal["2016", "2008"] = "2016"
     heat_dissipation_W_K: Annotated[float, between(0.001, 1000.0)] | None = None
 
@@ -63,6 +69,23 @@ class Bearing(Section):
         return max(0.0, 0.3 * (self.bore_mm + self.outside_diameter_mm) - level_below_axis_mm)
 
     @property
+    def axial_constants(self) -> tuple[float, float]:
+        """Constants of an axial load: S1 of rollers; S2 of balls, and their static load rating [N]."""
+        if self.type == "deep_groove_ball":
+            return float(self.S2 or 0.0), 1e3 * float(self.static_load_kN or 0.0)
+        return FLANGE_SLIDING if self.S1 is None else self.S1, 0.0
+
+    def axial_fault(self) -> str | None:
+        """Reason why it cannot take the axial force of helical gears; None if it can."""
+        if self.type == "cylindrical_roller" and NO_FLANGE.match(self.designation):
+            return f"{self.designation} lets the shaft move: an NJ, an NUP or a deep groove ball bearing can locate it"
+        if self.type == "deep_groove_ball" and (self.S2 is None or self.static_load_kN is None):
+            return "S2 of its series (SKF) and static_load_kN, the rating C0 of the catalogue, are needed"
+        return (
+            None if self.load_share > 0.0 else "its load_share is 0, and a locating bearing carries a radial load too"
+        )
+
+    @property
     def sliding_constant(self) -> float:
         """S1 of a ball bearing, S2 of a roller bearing, [-]."""
         return float(getattr(self, SLIDING_OF_TYPE[self.type]))
@@ -74,12 +97,11 @@ class Bearing(Section):
 
     @model_validator(mode="after")
     def _constants_are_those_of_the_type(self) -> Self:
-        own = (*OF_TYPE[self.type], SLIDING_OF_TYPE[self.type])
-        for key in ("S1", "S2", "K_L"):
-            if getattr(self, key) is None and key in own:
-                raise ValueError(f"{key} is missing, by which SKF's model calculates the sliding of a {self.type}")
-            if getattr(self, key) is not None and key not in own:
-                raise ValueError(f"{key} is given, which a {self.type} does not have in SKF's model; leave it out")
+        key = SLIDING_OF_TYPE[self.type]
+        if getattr(self, key) is None:
+            raise ValueError(f"{key} is missing, by which SKF's model calculates the sliding of a {self.type}")
+        if self.K_L is not None and "K_L" not in OF_TYPE[self.type]:
+            raise ValueError(f"K_L is given, which a {self.type} does not have in SKF's model; leave it out")
         return self
 
     @model_validator(mode="after")

@@ -15,7 +15,8 @@ FOLDER, FILE = "bearings", "known"
 # Under a radial load N, NJ and NUP have the constants of NU.
 DESIGNATION = re.compile(r"\s*(N|NJ|NU|NUP)?\s*(\d{3,4})(?!\d)(?!.*RS)")
 SIZES = ("bore_mm", "outside_diameter_mm", "width_mm", "mass_kg")
-FILLED = (*SIZES, "R1", "S1", "S2", "type", "model")  # what a designation gives
+RATING = "static_load_kN"  # of balls
+FILLED = (*SIZES, RATING, "R1", "S1", "S2", "type", "model")  # what a designation gives
 UNCERTAIN, SD_SHARE = ("mass_kg", "R1", "S1", "S2"), 0.1  # the constants are those of a series, rounded
 
 
@@ -26,7 +27,7 @@ def _catalogue() -> dict[str, tuple[dict[str, Any], str, str]]:
     for series in parse(read_text(packaged(FOLDER, FILE)), file=f"{FILE}.toml")["series"]:
         of_all = {key: series[key] for key in ("type", "R1", "S1", "S2") if key in series} | {"model": "skf"}
         for name, sizes in series["sizes"].items():
-            values = dict(zip(SIZES, map(float, sizes), strict=True))
+            values = dict(zip((*SIZES, RATING), map(float, sizes), strict=False))  # rollers end before the rating
             found[name] = values | of_all, series["name"], series["source"]
     return found
 
@@ -84,7 +85,9 @@ def filled_by_designation(own: dict[str, Any], notes: Annotations, path: str) ->
         values, series, of_mass = _catalogue()[name]
         filled = {key: value for key, value in values.items() if key not in own}
         for key in filled:
-            of_key = of_mass if key == "mass_kg" else f"{name}, ISO 15 and SKF friction model, series {series}"
+            of_key = (
+                of_mass if key in ("mass_kg", RATING) else f"{name}, ISO 15 and SKF friction model, series {series}"
+            )
             notes.sources[f"{path}.{key}"] = f"typical: {of_key}"
             if key in UNCERTAIN:
                 notes.priors[f"{path}.{key}"] = SD_SHARE * filled[key]

@@ -270,7 +270,7 @@ class Stage(Section):
     z: tuple[Teeth, Teeth]
     module_mm: Annotated[float, between(0.2, 50.0)]
     pressure_angle_deg: Annotated[float, between(10.0, 35.0)]
-    helix_angle_deg: float = 0.0
+    helix_angle_deg: Annotated[float, between(0.0, 45.0)] = 0.0
     face_width_mm: Annotated[float, between(1.0, 1000.0)]
     center_distance_mm: Annotated[float, between(5.0, 5000.0)]
     profile_shift: tuple[Annotated[float, between(-2.0, 3.0)], Annotated[float, between(-2.0, 3.0)]]
@@ -286,6 +286,7 @@ class Stage(Section):
 
     module = in_si("module_mm")
     pressure_angle = in_si("pressure_angle_deg")
+    helix_angle = in_si("helix_angle_deg")
     face_width = in_si("face_width_mm")
     center_distance = in_si("center_distance_mm")
     tip_diameter = InSI[tuple[float, float] | None]("tip_diameter_mm")
@@ -311,6 +312,7 @@ class Stage(Section):
             b=self.face_width,
             a=self.center_distance,
             x=self.profile_shift,
+            beta=self.helix_angle,
             tip_shortening=self.tip_shortening,
             r_a=None if self.tip_diameter is None else (self.tip_diameter[0] / 2.0, self.tip_diameter[1] / 2.0),
         )
@@ -332,11 +334,6 @@ class Stage(Section):
 
     @model_validator(mode="after")
     def _gears_are_possible(self) -> Self:
-        if self.helix_angle_deg != 0.0:
-            raise ValueError(
-                f"helix_angle_deg = {self.helix_angle_deg:g}: helical gears are not supported yet; only 0 (spur) is. "
-                "Describe such a machine without geometry: python -m builder new FILE --like reducer"
-            )
         for name, bore, r_f in zip(self.names, self.bore_mm, self.pair().r_f, strict=True):
             if bore >= 2e3 * r_f:
                 raise ValueError(f"bore_mm of '{name}' is {bore:g}, not below its root diameter {2e3 * r_f:.4g} mm")

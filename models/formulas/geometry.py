@@ -1,11 +1,11 @@
-"""Geometry and kinematics of an external spur gear pair.
+"""Geometry and kinematics of an external pair of cylindrical gears, spur or helical.
 
-Lengths in m, angles in rad. A position on the line of action is its coordinate ``t``: the distance from T1, where the
-line touches the base circle of gear 1. Gear 1 drives, so a tooth pair enters at A, and leaves at E; between B and D it
-is alone (contact ratio below 2). The plain functions are the formulas; :func:`gear_pair` checks the input and fills a
-:class:`GearPair`.
+Lengths in m, angles in rad. A position on the line of action is its coordinate ``t`` in the transverse plane: the
+distance from T1, where the line touches the base circle of gear 1. Gear 1 drives, so a tooth pair enters at A, and
+leaves at E; between B and D it is alone (contact ratio below 2; at one face position of helical gears). The plain
+functions are the formulas; :func:`gear_pair` checks the input and fills a :class:`GearPair`.
 
-All formulas are those of DIN 3960 / ISO 21771 for cylindrical gears, with helix angle zero.
+All formulas are those of DIN 3960 / ISO 21771. Spur gears are those of helix angle zero.
 """
 
 from __future__ import annotations
@@ -14,12 +14,18 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
 
 from models.base.errors import InputError
 from models.base.types import Array, Numeric
+from models.formulas.involute import (
+    ADDENDUM,
+    centre_distance,
+    half_tooth_angle,
+    profile_shift_sum,
+    smallest_profile_shift,
+    transverse_pressure_angle,
+)
 
-ADDENDUM = 1.0  # h_aP / m_n of the basic rack, ISO 53 profile A
 DEDENDUM = 1.25  # h_fP / m_n of the basic rack, ISO 53 profile A
 # Below this rack addendum undercut reaches the working flank (DIN 3960: z_min = 14 in place of 17 at 20 degrees).
 # The theoretical value 1.0 would refuse FZG type A, whose wheel has x = -0.5 where theory asks for -0.404.
@@ -28,142 +34,10 @@ UNDERCUT_ADDENDUM = 14.0 / 17.0
 SHIFT_SUM_TOLERANCE = 0.05
 
 
-def involute(alpha: float) -> float:
-    r"""Involute function, :math:`\mathrm{inv}\,\alpha = \tan\alpha - \alpha` (ISO 21771); both in rad.
-
-    Examples
-    --------
-    >>> round(involute(math.radians(20.0)), 6)
-    0.014904
-    """
-    return math.tan(alpha) - alpha
-
-
-def profile_shift_sum(z: tuple[int, int], alpha_n: float, alpha_wt: float) -> float:
-    r"""Sum of the profile shifts that meshes free of backlash at a working pressure angle (ISO 21771).
-
-    .. math:: x_1 + x_2 = \frac{(z_1 + z_2)(\mathrm{inv}\,\alpha_{wt} - \mathrm{inv}\,\alpha_n)}{2\tan\alpha_n}
-
-    Parameters
-    ----------
-    z : tuple of int
-        Numbers of teeth, [-]
-    alpha_n : float
-        Pressure angle of the basic rack, [rad]
-    alpha_wt : float
-        Working pressure angle, [rad]
-
-    Returns
-    -------
-    float
-        Sum of the profile shift coefficients, [-]
-
-    Examples
-    --------
-    >>> round(profile_shift_sum((16, 24), math.radians(20.0), math.radians(22.4388)), 4)
-    0.3532
-    """
-    return sum(z) * (involute(alpha_wt) - involute(alpha_n)) / (2.0 * math.tan(alpha_n))
-
-
-def centre_distance(z: tuple[int, int], m_n: float, alpha_n: float, x_sum: float) -> float:
-    """Centre distance at which two profile-shifted gears mesh free of backlash; inverse of :func:`profile_shift_sum`.
-
-    Parameters
-    ----------
-    z : tuple of int
-        Numbers of teeth, [-]
-    m_n : float
-        Module, [m]
-    alpha_n : float
-        Pressure angle of the basic rack, [rad]
-    x_sum : float
-        Sum of the profile shift coefficients, [-]
-
-    Returns
-    -------
-    float
-        Centre distance, [m]; NaN if the shifts are too negative for the teeth to mesh
-
-    Examples
-    --------
-    >>> round(1e3 * centre_distance((16, 24), 4.5e-3, math.radians(20.0), 0.1817 + 0.1715), 3)
-    91.5
-    """
-
-    def excess(alpha_wt: float) -> float:
-        return profile_shift_sum(z, alpha_n, alpha_wt) - x_sum
-
-    steepest = math.radians(80.0)
-    if not excess(0.0) <= 0.0 <= excess(steepest):
-        return math.nan
-    alpha_wt = float(brentq(excess, 0.0, steepest, xtol=1e-14))
-    return 0.5 * sum(z) * m_n * math.cos(alpha_n) / math.cos(alpha_wt)
-
-
-def smallest_profile_shift(z: int, alpha_n: float, addendum: float = ADDENDUM) -> float:
-    r"""Profile shift below which the rack undercuts the tooth, :math:`x = h_{a}^* - z\sin^2\alpha_n/2` (DIN 3960).
-
-    Parameters
-    ----------
-    z : int
-        Number of teeth, [-]
-    alpha_n : float
-        Pressure angle of the basic rack, [rad]
-    addendum : float
-        Rack addendum up to which the flank is straight, over the module, [-]; 1.0 gives the theoretical limit,
-        14/17 the practical one
-
-    Returns
-    -------
-    float
-        Limiting profile shift coefficient, [-]
-
-    Examples
-    --------
-    >>> round(smallest_profile_shift(16, math.radians(20.0)), 4)
-    0.0642
-    """
-    return addendum - 0.5 * z * math.sin(alpha_n) ** 2
-
-
-def half_tooth_angle(*, z: int, x: float, alpha_n: float, r_b: float, r: float) -> float:
-    r"""Half the angle that a tooth subtends at a radius (ISO 21771).
-
-    .. math:: \psi(r) = \frac{\pi/2 + 2x\tan\alpha_n}{z} + \mathrm{inv}\,\alpha_n - \mathrm{inv}\,\alpha_r,
-              \qquad \cos\alpha_r = r_b / r
-
-    Parameters
-    ----------
-    z : int
-        Number of teeth, [-]
-    x : float
-        Profile shift coefficient, [-]
-    alpha_n : float
-        Pressure angle of the basic rack, [rad]
-    r_b : float
-        Base radius, [m]
-    r : float
-        Radius, [m]; below r_b the angle of the base circle holds (radial flank)
-
-    Returns
-    -------
-    float
-        Half tooth angle, [rad]; negative beyond the point of the tooth
-
-    Examples
-    --------
-    >>> round(half_tooth_angle(z=16, x=0.182, alpha_n=math.radians(20.0), r_b=33.829e-3, r=33.829e-3), 5)
-    0.12136
-    """
-    alpha_r = math.acos(min(1.0, r_b / r))
-    return (0.5 * math.pi + 2.0 * x * math.tan(alpha_n)) / z + involute(alpha_n) - involute(alpha_r)
-
-
-def gear_loss_factor_ohlendorf(*, z_1: int, u: float, epsilon_1: float, epsilon_2: float) -> float:
+def gear_loss_factor_ohlendorf(*, z_1: int, u: float, epsilon_1: float, epsilon_2: float, beta_b: float = 0.0) -> float:
     r"""Gear loss factor after Ohlendorf [1]_: rigid teeth, pitch point where one pair carries alone.
 
-    .. math:: H_V = \frac{\pi(u+1)}{z_1 u}\,(1 - \varepsilon_\alpha + \varepsilon_1^2 + \varepsilon_2^2)
+    .. math:: H_V = \frac{\pi(u+1)}{z_1 u\cos\beta_b}\,(1 - \varepsilon_\alpha + \varepsilon_1^2 + \varepsilon_2^2)
 
     Parameters
     ----------
@@ -173,6 +47,8 @@ def gear_loss_factor_ohlendorf(*, z_1: int, u: float, epsilon_1: float, epsilon_
         Gear ratio z_2 / z_1, [-]
     epsilon_1, epsilon_2 : float
         Tip contact ratios CE / p_b of gear 1 and AC / p_b of gear 2, [-]
+    beta_b : float
+        Helix angle at the base circle, [rad]
 
     Returns
     -------
@@ -189,12 +65,13 @@ def gear_loss_factor_ohlendorf(*, z_1: int, u: float, epsilon_1: float, epsilon_
     >>> round(gear_loss_factor_ohlendorf(z_1=16, u=1.5, epsilon_1=0.7221, epsilon_2=0.7151), 4)
     0.1949
     """
-    return math.pi * (u + 1.0) / (z_1 * u) * (1.0 - (epsilon_1 + epsilon_2) + epsilon_1**2 + epsilon_2**2)
+    spur = math.pi * (u + 1.0) / (z_1 * u) * (1.0 - (epsilon_1 + epsilon_2) + epsilon_1**2 + epsilon_2**2)
+    return spur / math.cos(beta_b)
 
 
 @dataclass(frozen=True, kw_only=True)
 class GearPair:
-    """An external spur gear pair whose input has been checked; built by :func:`gear_pair`.
+    """An external pair of cylindrical gears whose input has been checked; built by :func:`gear_pair`.
 
     Pairs of values belong to gear 1 (driving) and gear 2. Attributes T1A ... T1E are coordinates on the line of action.
 
@@ -203,9 +80,11 @@ class GearPair:
     z : tuple of int
         Numbers of teeth, [-]
     m_n, b, a : float
-        Module, face width, working centre distance, [m]
-    alpha_n, alpha_wt : float
-        Pressure angle of the basic rack and working pressure angle, [rad]
+        Normal module, face width, working centre distance, [m]
+    alpha_n, alpha_t, alpha_wt : float
+        Pressure angle of the basic rack, in the transverse plane, and working pressure angle there, [rad]
+    beta, beta_b : float
+        Helix angle at the reference and at the base circle, [rad]
     x, k : tuple of float
         Profile shift and tip alteration coefficients, [-]
     u : float
@@ -213,12 +92,14 @@ class GearPair:
     r, r_b, r_w, r_a, r_f : tuple of float
         Reference, base, working pitch, tip and root radii, [m]
     p_b : float
-        Base pitch, [m]
+        Base pitch in the transverse plane, [m]
     T1T2, T1A, T1B, T1C, T1D, T1E : float
         Length of the line of action, and coordinates: start of contact A, end of contact less one base pitch B, pitch
         point C, start plus one base pitch D, end of contact E, [m]
     epsilon_alpha, epsilon_1, epsilon_2 : float
-        Contact ratio, and its shares CE / p_b and AC / p_b, [-]
+        Transverse contact ratio, and its shares CE / p_b and AC / p_b, [-]
+    epsilon_beta : float
+        Overlap ratio, [-]; 0 of spur gears
     rho_red_C : float
         Radius of relative curvature at the pitch point, [m]
     H_V : float
@@ -230,7 +111,10 @@ class GearPair:
     b: float
     a: float
     alpha_n: float
+    alpha_t: float
     alpha_wt: float
+    beta: float
+    beta_b: float
     x: tuple[float, float]
     k: tuple[float, float]
     u: float
@@ -249,11 +133,15 @@ class GearPair:
     epsilon_alpha: float
     epsilon_1: float
     epsilon_2: float
+    epsilon_beta: float
     rho_red_C: float
     H_V: float
 
     def curvature_radii(self, t: Numeric) -> tuple[Array, Array, Array]:
-        """Radii of curvature of the flanks in contact, and of relative curvature (Euler-Savary on involutes).
+        r"""Radii of curvature of the flanks in contact, and of relative curvature (Euler-Savary on involutes).
+
+        .. math:: \rho_1 = t, \quad \rho_2 = \overline{T_1T_2} - t, \quad
+                  R = \frac{\rho_1\rho_2}{\overline{T_1T_2}\cos\beta_b}
 
         Parameters
         ----------
@@ -263,14 +151,15 @@ class GearPair:
         Returns
         -------
         (rho_1, rho_2, R) : tuple of Array, shape (...)
-            Radii of flank 1, of flank 2, and of relative curvature rho_1 rho_2 / T1T2, [m]
+            Radii of flank 1 and flank 2 in the transverse plane, and of relative curvature across the line of
+            contact, [m]
         """
         rho_1 = np.asarray(t, dtype=np.float64)
         rho_2 = self.T1T2 - rho_1
-        return rho_1, rho_2, rho_1 * rho_2 / self.T1T2
+        return rho_1, rho_2, rho_1 * rho_2 / (self.T1T2 * math.cos(self.beta_b))
 
     def speeds(self, t: Numeric, omega_1: Numeric) -> tuple[Array, Array]:
-        """Speeds of the two flanks along the contact, relative to the contact point.
+        """Speeds of the two flanks in the transverse plane, relative to the contact point.
 
         Parameters
         ----------
@@ -293,10 +182,31 @@ class GearPair:
         u_1, u_2 = self.speeds(t, omega_1)
         return np.asarray(np.abs(u_1 - u_2), dtype=np.float64)
 
-    def base_half_angle(self, gear: int) -> float:
-        """Half tooth angle at the base circle of gear 0 (driving) or 1 (driven), [rad]."""
-        r_b = self.r_b[gear]
-        return half_tooth_angle(z=self.z[gear], x=self.x[gear], alpha_n=self.alpha_n, r_b=r_b, r=r_b)
+    def virtual_tooth(self, gear: int) -> tuple[float, float, float]:
+        r"""Tooth of the virtual spur gear that has the tooth's normal section; of a spur gear its own.
+
+        .. math:: z_n = z / (\cos^2\beta_b\cos\beta), \quad r_{bn} = \tfrac12 m_n z_n\cos\alpha_n
+
+        Parameters
+        ----------
+        gear : int
+            0 (driving) or 1 (driven)
+
+        Returns
+        -------
+        (psi_b, r_b, r_f) : tuple of float
+            Half tooth angle at the base circle [rad], base and root radius [m]
+
+        References
+        ----------
+        ISO 6336-1; from memory, verified by the radius of curvature at the pitch point of unshifted gears, which is
+        that of the transverse plane over the cosine of beta_b.
+        """
+        z_n = self.z[gear] / (math.cos(self.beta_b) ** 2 * math.cos(self.beta))
+        r = 0.5 * self.m_n * z_n
+        r_b = r * math.cos(self.alpha_n)
+        psi_b = half_tooth_angle(z=z_n, x=self.x[gear], alpha_n=self.alpha_n, r_b=r_b, r=r_b)
+        return psi_b, r_b, r - self.m_n * (DEDENDUM - self.x[gear])
 
 
 def _shape_faults(pair: GearPair) -> list[str]:
@@ -304,7 +214,7 @@ def _shape_faults(pair: GearPair) -> list[str]:
     faults = []
     for i in (0, 1):
         gear = f"gear {i + 1}"
-        x_least = smallest_profile_shift(pair.z[i], pair.alpha_n, UNDERCUT_ADDENDUM)
+        x_least = smallest_profile_shift(pair.z[i], pair.alpha_n, UNDERCUT_ADDENDUM, pair.beta)
         if pair.x[i] < x_least:
             faults.append(
                 f"{gear}: profile shift {pair.x[i]:g} undercuts its {pair.z[i]} teeth; "
@@ -316,7 +226,9 @@ def _shape_faults(pair: GearPair) -> list[str]:
                 f"{2e3 * pair.r_b[i]:.3f} mm and the root diameter {2e3 * pair.r_f[i]:.3f} mm"
             )
             continue
-        psi_a = half_tooth_angle(z=pair.z[i], x=pair.x[i], alpha_n=pair.alpha_n, r_b=pair.r_b[i], r=pair.r_a[i])
+        psi_a = half_tooth_angle(
+            z=pair.z[i], x=pair.x[i], alpha_n=pair.alpha_n, beta=pair.beta, r_b=pair.r_b[i], r=pair.r_a[i]
+        )
         if psi_a <= 0.0:
             faults.append(
                 f"{gear}: pointed teeth, tip thickness {2e3 * pair.r_a[i] * psi_a:.3f} mm at tip diameter "
@@ -346,8 +258,8 @@ def _shape_faults(pair: GearPair) -> list[str]:
     return faults
 
 
-def _asked_centre_distance(z: tuple[int, int], m_n: float, alpha_n: float, x_sum: float) -> str:
-    a = centre_distance(z, m_n, alpha_n, x_sum)
+def _asked_centre_distance(z: tuple[int, int], m_n: float, alpha_n: float, x_sum: float, beta: float) -> str:
+    a = centre_distance(z, m_n, alpha_n, x_sum, beta)
     return "have no centre distance at all" if math.isnan(a) else f"ask for {1e3 * a:.3f} mm"
 
 
@@ -359,21 +271,26 @@ def gear_pair(
     b: float,
     a: float,
     x: tuple[float, float],
+    beta: float = 0.0,
     tip_shortening: bool = True,
     r_a: tuple[float, float] | None = None,
 ) -> GearPair:
-    r"""Check a spur gear pair and compute its geometry (DIN 3960 / ISO 21771).
+    r"""Check a pair of cylindrical gears and compute its geometry (DIN 3960 / ISO 21771).
 
     .. math::
+        \tan\alpha_t = \tan\alpha_n/\cos\beta, \quad \sin\beta_b = \sin\beta\cos\alpha_n, \quad
+        r = \frac{m_n z}{2\cos\beta}, \quad r_b = r\cos\alpha_t, \quad
+        \varepsilon_\beta = \frac{b\sin\beta}{\pi m_n} \\
         \cos\alpha_{wt} = \frac{r_{b1}+r_{b2}}{a}, \quad \overline{T_1E} = \sqrt{r_{a1}^2 - r_{b1}^2}, \quad
-        \overline{T_1A} = a\sin\alpha_{wt} - \sqrt{r_{a2}^2 - r_{b2}^2}, \quad p_b = \pi m_n\cos\alpha_n
+        \overline{T_1A} = a\sin\alpha_{wt} - \sqrt{r_{a2}^2 - r_{b2}^2}, \quad
+        p_b = \pi m_n\cos\alpha_t/\cos\beta
 
     Parameters
     ----------
     z : tuple of int
         Numbers of teeth of the driving and the driven gear, [-]
     m_n : float
-        Module, [m]
+        Normal module, [m]
     alpha_n : float
         Pressure angle of the basic rack, [rad]
     b : float
@@ -382,6 +299,8 @@ def gear_pair(
         Working centre distance, [m]; kept as given when x_1 + x_2 departs from it by rounding or backlash
     x : tuple of float
         Profile shift coefficients, [-]
+    beta : float
+        Helix angle at the reference circle, [rad]; its hand makes no difference
     tip_shortening : bool
         Shorten both tips by k = (a - a_0)/m_n - (x_1 + x_2) modules, which keeps the rack's tip clearance; k is held
         at 0 or below
@@ -407,19 +326,21 @@ def gear_pair(
     >>> round(pair.epsilon_alpha, 5), round(2e3 * pair.r_a[0], 3), round(2e3 * pair.r_a[1], 3)
     (1.43716, 82.452, 118.362)
     """
-    r = (0.5 * m_n * z[0], 0.5 * m_n * z[1])
-    r_b = (r[0] * math.cos(alpha_n), r[1] * math.cos(alpha_n))
+    m_t, alpha_t = m_n / math.cos(beta), transverse_pressure_angle(alpha_n, beta)
+    beta_b = math.asin(math.sin(beta) * math.cos(alpha_n))
+    r = (0.5 * m_t * z[0], 0.5 * m_t * z[1])
+    r_b = (r[0] * math.cos(alpha_t), r[1] * math.cos(alpha_t))
     if a <= sum(r_b):
         raise InputError(
             f"gear pair: centre distance {1e3 * a:g} mm must be above {1e3 * sum(r_b):.3f} mm, the sum of the base "
-            f"radii; profile shifts {x[0]:g} and {x[1]:g} {_asked_centre_distance(z, m_n, alpha_n, sum(x))}"
+            f"radii; profile shifts {x[0]:g} and {x[1]:g} {_asked_centre_distance(z, m_n, alpha_n, sum(x), beta)}"
         )
     alpha_wt = math.acos(sum(r_b) / a)
-    x_sum = profile_shift_sum(z, alpha_n, alpha_wt)
+    x_sum = profile_shift_sum(z, alpha_n, alpha_wt, beta)
     if abs(sum(x) - x_sum) > SHIFT_SUM_TOLERANCE:
         raise InputError(
             f"gear pair: centre distance {1e3 * a:g} mm asks for profile shifts that sum to {x_sum:.4f}, but "
-            f"{x[0]:g} and {x[1]:g} sum to {sum(x):.4f} and {_asked_centre_distance(z, m_n, alpha_n, sum(x))}; "
+            f"{x[0]:g} and {x[1]:g} sum to {sum(x):.4f} and {_asked_centre_distance(z, m_n, alpha_n, sum(x), beta)}; "
             f"correct one of them (the sums may differ by {SHIFT_SUM_TOLERANCE:g})"
         )
 
@@ -429,7 +350,7 @@ def gear_pair(
     r_f = (r[0] - m_n * (DEDENDUM - x[0]), r[1] - m_n * (DEDENDUM - x[1]))
 
     u = z[1] / z[0]
-    p_b = math.pi * m_n * math.cos(alpha_n)
+    p_b = math.pi * m_t * math.cos(alpha_t)
     T1T2 = a * math.sin(alpha_wt)
     T1C = r_b[0] * math.tan(alpha_wt)
     # A tip inside its base circle is reported as a fault below; until then it counts as lying on it.
@@ -442,7 +363,10 @@ def gear_pair(
         b=b,
         a=a,
         alpha_n=alpha_n,
+        alpha_t=alpha_t,
         alpha_wt=alpha_wt,
+        beta=beta,
+        beta_b=beta_b,
         x=x,
         k=((r_a[0] - r[0]) / m_n - ADDENDUM - x[0], (r_a[1] - r[1]) / m_n - ADDENDUM - x[1]),
         u=u,
@@ -461,8 +385,9 @@ def gear_pair(
         epsilon_alpha=(T1E - T1A) / p_b,
         epsilon_1=epsilon_1,
         epsilon_2=epsilon_2,
-        rho_red_C=T1C * (T1T2 - T1C) / T1T2,
-        H_V=gear_loss_factor_ohlendorf(z_1=z[0], u=u, epsilon_1=epsilon_1, epsilon_2=epsilon_2),
+        epsilon_beta=b * math.sin(beta) / (math.pi * m_n),
+        rho_red_C=T1C * (T1T2 - T1C) / (T1T2 * math.cos(beta_b)),
+        H_V=gear_loss_factor_ohlendorf(z_1=z[0], u=u, epsilon_1=epsilon_1, epsilon_2=epsilon_2, beta_b=beta_b),
     )
     if faults := _shape_faults(pair):
         raise InputError("gear pair: " + "; ".join(faults))

@@ -1,17 +1,20 @@
 """How the normal force is shared by the tooth pairs in contact, and the points at which the mesh is evaluated.
 
 A pair that touches at coordinate t (from T1, see :mod:`models.formulas.geometry`) has companions at t + j p_b that
-lie between
-A and E; the share R of a pair is its part of the total, so the shares of companions sum to 1. Every model here is free
-of profile errors and load-independent: shares are computed once per gear pair.
+lie between A and E; the share R of a pair is its part of the total, so the shares of companions sum to 1. Of helical
+gears a line of contact crosses the face at an angle, and the load per length on it is R times the mean one. Every model
+here is free of profile errors, crowning and misalignment, and load-independent: shares are computed once per gear pair.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
 from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.polynomial import Chebyshev
 
 from models.base.errors import InputError
 from models.base.types import Array, Numeric
@@ -20,10 +23,16 @@ from models.formulas.mesh_stiffness import tooth_pair_stiffness
 
 LoadSharing = Literal["potential_energy", "sanchez_pedrero", "equal"]
 _ROUNDING = 1e-9  # in base pitches: a pair this close outside A ... E still counts as touching there
+# Gauss points of helical gears between two kinks, along the path of contact and over the face: the loss factor is
+# within 0.1 % of that with 6 x 6, for helix angles from 0.01 to 30 degrees; sliding losses were within 0.4 %.
+_GAUSS = 2
+_CHEBYSHEV_DEGREE = 20  # of the stiffness of a pair along the path of contact
 
 
 class ContactPoints(NamedTuple):
     """Quadrature on the path of contact: the integral of f over A ... E is ``sum(f(t) * dx)``; ``t, dx, share``.
+
+    Of helical gears it goes over the face width too, as a mean.
 
     Attributes
     ----------
@@ -32,7 +41,8 @@ class ContactPoints(NamedTuple):
     dx : Array, shape (points,)
         Weights; they sum to the length AE, [m]
     share : Array, shape (points,)
-        Share R of the normal force carried there by one pair, [-]
+        Share R of the normal force carried there by one pair, [-]; the force in the transverse plane times R over the
+        face width is the load per length of the line of contact
     """
 
     t: Array
@@ -49,7 +59,7 @@ def load_share(
     E: tuple[float, float] = (206e9, 206e9),
     nu: tuple[float, float] = (0.3, 0.3),
 ) -> Array:
-    r"""Share of the normal force that the tooth pair touching at t carries.
+    r"""Share of the normal force that the tooth pair touching at t carries, at one face position.
 
     .. math:: R(t) = w(t) \Big/ \sum_j w(t + j p_b), \qquad \overline{T_1A} \le t + j p_b \le \overline{T_1E}
 
@@ -94,16 +104,21 @@ def load_share(
     slack = _ROUNDING * pair.p_b
     touching = (companions >= pair.T1A - slack) & (companions <= pair.T1E + slack)
     companions = np.clip(companions, pair.T1A, pair.T1E)  # weights are defined there only; `touching` masks the rest
-
-    if model == "potential_energy":
-        weight = tooth_pair_stiffness(pair, companions, r_bore=r_bore, E=E, nu=nu)
-    elif model == "sanchez_pedrero":
-        weight = unit_stiffness_sanchez_pedrero((companions - pair.T1A) / pair.p_b, pair.epsilon_alpha)
-    else:
-        weight = np.ones_like(companions)
-    weight = np.where(touching, weight, 0.0)
+    weight = np.where(touching, _weight_of(pair, model, r_bore, E, nu)(companions), 0.0)
     total = weight.sum(axis=-1)
     return np.asarray(weight[..., most] / np.where(total > 0.0, total, 1.0), dtype=np.float64)
+
+
+def _weight_of(
+    pair: GearPair, model: LoadSharing, r_bore: tuple[float, float] | None, E: tuple[float, float],
+    nu: tuple[float, float],
+) -> Callable[[Array], Array]:  # fmt: skip
+    """Weight of a pair by its coordinate between A and E, for the model; parameters as :func:`load_share`."""
+    if model == "potential_energy":
+        return partial(tooth_pair_stiffness, pair, r_bore=r_bore, E=E, nu=nu)
+    if model == "sanchez_pedrero":
+        return lambda t: unit_stiffness_sanchez_pedrero((t - pair.T1A) / pair.p_b, pair.epsilon_alpha)
+    return np.ones_like
 
 
 def unit_stiffness_sanchez_pedrero(xi: Numeric, epsilon_alpha: float) -> Array:
@@ -164,13 +179,7 @@ def contact_breakpoints(pair: GearPair) -> Array:
         ratio 2
     """
     steps = np.arange(math.ceil(pair.epsilon_alpha) + 1) * pair.p_b
-    candidates = np.concatenate([pair.T1A + steps, pair.T1E - steps, [pair.T1C]])
-    slack = _ROUNDING * pair.p_b
-    inside = candidates[(candidates > pair.T1A + slack) & (candidates < pair.T1E - slack)]
-    points = np.sort(np.concatenate([[pair.T1A], inside, [pair.T1E]]))
-    distinct = np.concatenate([[True], np.diff(points) > slack])
-    # Of two that coincide up to rounding the first stays; E, which is last, is kept apart by the filter above.
-    return np.asarray(points[distinct], dtype=np.float64)
+    return _between(pair.T1A, pair.T1E, np.concatenate([pair.T1A + steps, pair.T1E - steps, [pair.T1C]]))
 
 
 def contact_points(
@@ -182,14 +191,23 @@ def contact_points(
     E: tuple[float, float] = (206e9, 206e9),
     nu: tuple[float, float] = (0.3, 0.3),
 ) -> ContactPoints:
-    """Gauss-Legendre points on every segment between breakpoints of the path of contact, with the load share there.
+    r"""Gauss-Legendre points on every segment between breakpoints of the path of contact, with the load share there.
+
+    Of helical gears a pair at :math:`\xi` base pitches from A on one edge is at :math:`\xi + \varepsilon_\beta \eta`
+    of its course where the face position is :math:`\eta`, 0 to 1. All lines of contact share one displacement, so
+
+    .. math:: R(\xi, \eta) = \frac{\kappa(\xi)}{D(\xi + \varepsilon_\beta\eta)}, \qquad
+              D(\varphi) = \frac{1}{\varepsilon_\beta}
+              \sum_j \int_{\varphi + j - \varepsilon_\beta}^{\varphi + j} \kappa(\xi')\,d\xi'
+
+    with the weight :math:`\kappa` of the model, 0 outside A ... E ("equal": uniform load on the lines of contact).
 
     Parameters
     ----------
     pair : GearPair
         The gears
     n : int
-        Points per segment, [-]; there are four segments below contact ratio 2
+        Points per segment of spur gears, [-]; there are four segments below contact ratio 2
     model, r_bore, E, nu
         As in :func:`load_share`
 
@@ -213,20 +231,77 @@ def contact_points(
     >>> round(load_sharing_loss_factor(pair, points), 4)
     0.1915
     """
-    nodes, weights = np.polynomial.legendre.leggauss(n)
-    breakpoints = contact_breakpoints(pair)
-    half = 0.5 * np.diff(breakpoints)[:, np.newaxis]
-    t = (breakpoints[:-1, np.newaxis] + half * (1.0 + nodes)).ravel()
-    dx = (half * weights).ravel()
+    if pair.epsilon_beta > 0.0:
+        return _points_on_lines(pair, _weight_of(pair, model, r_bore, E, nu))
+    t, dx = _gauss_points(contact_breakpoints(pair), n)
     return ContactPoints(t=t, dx=dx, share=load_share(pair, t, model=model, r_bore=r_bore, E=E, nu=nu))
+
+
+def _gauss_points(breakpoints: Array, n: int) -> tuple[Array, Array]:
+    """Gauss-Legendre points and weights on every segment between breakpoints, each of shape (segments * n,)."""
+    nodes, weights = np.polynomial.legendre.leggauss(n)
+    half = 0.5 * np.diff(breakpoints)[:, np.newaxis]
+    return (breakpoints[:-1, np.newaxis] + half * (1.0 + nodes)).ravel(), (half * weights).ravel()
+
+
+def _points_on_lines(pair: GearPair, weight: Callable[[Array], Array]) -> ContactPoints:
+    """Points over the path of contact and the face width of helical gears; see :func:`contact_points`."""
+    path, overlap = pair.epsilon_alpha, pair.epsilon_beta
+    kappa = Chebyshev.interpolate(lambda xi: weight(pair.T1A + xi * pair.p_b), _CHEBYSHEV_DEGREE, domain=[0.0, path])
+    stiffness = kappa.integ(lbnd=0.0)
+    companions = np.arange(-math.ceil(path + overlap) - 1, math.ceil(path + overlap) + 2)
+    # Courses phi at which a line of contact begins or ends on one edge of the face, or reaches or leaves the other.
+    kinks = np.concatenate([companions + end for end in (0.0, path, overlap, path + overlap)])
+    # The load repeats with every whole pitch of the overlap.
+    whole, rest = divmod(overlap, 1.0)
+    points = []
+    for xi, d_xi in np.transpose(
+        _gauss_points(_between(0.0, path, np.concatenate([kinks, kinks - overlap, [pair.epsilon_2]])), _GAUSS)
+    ):
+        over_face = []
+        for length, share_of_face in ((1.0, whole / overlap), (rest, 1.0 / overlap)):
+            if length * share_of_face > _ROUNDING:
+                phi, d_phi = _gauss_points(_between(xi, xi + length, kinks), _GAUSS)
+                ends = phi[:, np.newaxis] + companions
+                lines = stiffness(np.clip(ends, 0.0, path)) - stiffness(np.clip(ends - overlap, 0.0, path))
+                over_face.append(np.stack([kappa(xi) / (lines.sum(axis=-1) / overlap), d_phi * share_of_face]))
+        share, weight_of_share = _two_points(*np.concatenate(over_face, axis=-1))
+        points.append(np.stack([np.full_like(share, xi), d_xi * weight_of_share, share]))
+    xi, weights, share = np.concatenate(points, axis=-1)
+    return ContactPoints(t=pair.T1A + xi * pair.p_b, dx=weights * pair.p_b, share=share)
+
+
+def _two_points(values: Array, weights: Array) -> tuple[Array, Array]:
+    """Two values and their weights with the mean, variance and third moment of many, whose weights sum to 1.
+
+    What is smooth in the load has the same mean over them, to third order.
+    """
+    mean = weights @ values
+    deviation = math.sqrt(weights @ (values - mean) ** 2)
+    if deviation < _ROUNDING * mean:
+        return np.full(2, mean), np.full(2, 0.5)
+    skewness = weights @ ((values - mean) / deviation) ** 3
+    root = math.hypot(skewness, 2.0)
+    steps = 0.5 * np.array([skewness - root, skewness + root])
+    return mean + deviation * steps, steps[::-1] * np.array([1.0, -1.0]) / root
+
+
+def _between(low: float, high: float, candidates: Array) -> Array:
+    """Breakpoints from `low` to `high`: both, and the distinct candidates between them."""
+    slack = _ROUNDING * (high - low)
+    inside = np.sort(candidates[(candidates > low + slack) & (candidates < high - slack)])
+    points = np.concatenate([[low], inside, [high]])
+    # Of two that coincide up to rounding the first stays; the last is kept apart by the filter above.
+    return np.asarray(points[np.concatenate([[True], np.diff(points) > slack])], dtype=np.float64)
 
 
 def load_sharing_loss_factor(pair: GearPair, points: ContactPoints) -> float:
     r"""Gear loss factor with a given load share: sliding loss over input power at a friction coefficient of 1 [1]_.
 
-    .. math:: H_{VL} = \frac{1}{p_b} \int_A^E R(t)\, \frac{|u_1 - u_2|}{\omega_1 r_{b1}}\, dt
+    .. math:: H_{VL} = \frac{1}{p_b\cos\beta_b} \int_A^E R(t)\, \frac{|u_1 - u_2|}{\omega_1 r_{b1}}\, dt
 
-    With "equal" sharing and the pitch point where one pair carries alone this is Ohlendorf's factor exactly.
+    With "equal" sharing and the pitch point where one pair carries alone this is Ohlendorf's factor of spur gears
+    exactly. Helical gears have up to a fifth more: at each moment load is away from the pitch point.
 
     Parameters
     ----------
@@ -242,8 +317,9 @@ def load_sharing_loss_factor(pair: GearPair, points: ContactPoints) -> float:
 
     References
     ----------
-    .. [1] S. Wimmer, "Design of low-loss gears", dissertation, TU Muenchen, 2006; spur form. From memory; verified
-       against Ohlendorf's closed form.
+    .. [1] S. Wimmer, "Design of low-loss gears", dissertation, TU Muenchen, 2006. From memory; verified against
+       Ohlendorf's closed form, and for helical gears against that of a uniform load and the sum over slices that
+       GEARpie prints.
     """
     sliding = pair.sliding_speed(points.t, 1.0) / pair.r_b[0]
-    return float(np.sum(points.share * sliding * points.dx) / pair.p_b)
+    return float(np.sum(points.share * sliding * points.dx) / (pair.p_b * math.cos(pair.beta_b)))

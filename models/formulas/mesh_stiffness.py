@@ -1,4 +1,4 @@
-r"""Stiffness of a pair of spur teeth in contact, by the potential-energy method.
+r"""Stiffness of a pair of teeth in contact, by the potential-energy method; helical teeth by their normal section.
 
 Each tooth is a cantilever of variable section on an elastic gear body. Its compliance is the sum of bending, shear and
 axial compression of the tooth and of the turn of its foundation; the two teeth and the Hertzian contact lie in series:
@@ -229,6 +229,9 @@ def tooth_pair_stiffness(
 ) -> Array:
     """Stiffness of one pair of teeth that touches at a point of the line of action; see the module's text.
 
+    Of helical gears it is that of the virtual spur pair (:meth:`~models.formulas.geometry.GearPair.virtual_tooth`),
+    whose bores have the same ratio to its root circles.
+
     Parameters
     ----------
     pair : GearPair
@@ -259,7 +262,8 @@ def tooth_pair_stiffness(
     rho_1, rho_2, _ = pair.curvature_radii(t)
     compliance = np.full(rho_1.shape, hertz_compliance(b=pair.b, E=E, nu=nu))
     for i, rho in enumerate((rho_1, rho_2)):
-        roll, psi_b, r_b, r_f = rho / pair.r_b[i], pair.base_half_angle(i), pair.r_b[i], pair.r_f[i]
+        psi_b, r_b, r_f = pair.virtual_tooth(i)
+        roll, bore = rho / math.cos(pair.beta_b) / r_b, bores[i] * r_f / pair.r_f[i]
         compliance += tooth_compliance(roll, psi_b=psi_b, r_b=r_b, r_f=r_f, b=pair.b, E=E[i], nu=nu[i])
-        compliance += foundation_compliance(roll, psi_b=psi_b, r_b=r_b, r_f=r_f, r_bore=bores[i], b=pair.b, E=E[i])
+        compliance += foundation_compliance(roll, psi_b=psi_b, r_b=r_b, r_f=r_f, r_bore=bore, b=pair.b, E=E[i])
     return np.asarray(1.0 / compliance, dtype=np.float64)

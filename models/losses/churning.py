@@ -106,7 +106,7 @@ def churning_mauz(*, e: tuple[float, float], b: float, v_t: Numeric, omega_2: Nu
 
 def churning_changenet_velex(
     *, h: float, r_p: float, b: float, z: int, tooth_height: float, alpha: float, V_oil: float, omega: Numeric,
-    nu: Numeric, rho: Numeric
+    nu: Numeric, rho: Numeric, beta: float = 0.0
 ) -> Array:  # fmt: skip
     r"""Churning loss of one dipping gear after Changenet and Velex (2007).
 
@@ -130,7 +130,7 @@ def churning_changenet_velex(
     tooth_height : float
         [m]
     alpha : float
-        Pressure angle, [rad]
+        Pressure angle in the transverse plane, [rad]
     V_oil : float
         Oil volume, [m^3]
     omega : Numeric, shape (...)
@@ -139,6 +139,8 @@ def churning_changenet_velex(
         Kinematic viscosity, [mm^2/s]
     rho : Numeric, shape (...)
         Density, [kg/m^3]
+    beta : float
+        Helix angle, [rad]
 
     Returns
     -------
@@ -156,12 +158,12 @@ def churning_changenet_velex(
     share = np.clip((Re - RE_LAMINAR) / (RE_TURBULENT - RE_LAMINAR), 0.0, 1.0)
     calm, swirling = _regimes(h, r_p, b, V_oil, omega)
     C_m = (1.0 - share) * 1.366 * calm * np.minimum(Re, RE_TURBULENT) ** -0.21 + share * 3.644 * swirling
-    return np.asarray(0.5 * rho * omega**3 * _wetted(h, r_p, b, z, tooth_height, alpha) * r_p**3 * C_m)
+    return np.asarray(0.5 * rho * omega**3 * _wetted(h, r_p, b, z, tooth_height, alpha, beta) * r_p**3 * C_m)
 
 
 def churning_changenet_2011(
     *, h: float, r_p: float, b: float, z: int, tooth_height: float, alpha: float, V_oil: float, omega: Numeric,
-    nu: Numeric, rho: Numeric, module: float
+    nu: Numeric, rho: Numeric, module: float, beta: float = 0.0
 ) -> Array:  # fmt: skip
     r"""Churning loss of one dipping gear after Changenet, Leprince, Ville and Velex (2011).
 
@@ -190,13 +192,13 @@ def churning_changenet_2011(
     share = np.clip((gamma - GAMMA_CALM) / (GAMMA_SWIRLING - GAMMA_CALM), 0.0, 1.0)
     calm, swirling = _regimes(h, r_p, b, V_oil, omega)
     C_m = np.minimum(Re, RE_2011) ** -0.21 * ((1.0 - share) * 1.366 * calm + share * 20.797 * swirling)
-    return np.asarray(0.5 * rho * omega**3 * _wetted(h, r_p, b, z, tooth_height, alpha) * r_p**3 * C_m)
+    return np.asarray(0.5 * rho * omega**3 * _wetted(h, r_p, b, z, tooth_height, alpha, beta) * r_p**3 * C_m)
 
 
-def _wetted(h: float, r_p: float, b: float, z: int, tooth_height: float, alpha: float) -> float:
+def _wetted(h: float, r_p: float, b: float, z: int, tooth_height: float, alpha: float, beta: float) -> float:
     """Wetted area [m^2] of both faces, the rim, and both flanks of the dipping teeth; 0 of a dry gear."""
     theta = float(np.arccos(np.clip(1.0 - h / r_p, -1.0, 1.0)))
-    flanks = 2.0 * z * tooth_height * theta * b / (np.pi * np.cos(alpha))
+    flanks = 2.0 * z * tooth_height * theta * b / (np.pi * np.cos(alpha) * np.cos(beta))
     return float(r_p**2 * (2.0 * theta - np.sin(2.0 * theta)) + 2.0 * r_p * b * theta + flanks)
 
 
@@ -257,7 +259,8 @@ class ChurningLaw:
                         b=pair.b,
                         z=pair.z[i],
                         tooth_height=pair.r_a[i] - pair.r_f[i],
-                        alpha=pair.alpha_n,
+                        alpha=pair.alpha_t,
+                        beta=pair.beta,
                         V_oil=self.oil_volume,
                         omega=omega[i],
                         nu=nu,

@@ -102,16 +102,19 @@ def rolling_loss_anderson(*, h: Numeric, v_r: Numeric, b: float, constant: float
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeshContact:
-    """A gear mesh as a row of contact points along the path of contact.
+    """A gear mesh as a row of contact points along the path of contact, of helical gears on their lines of contact.
 
     Attributes
     ----------
     weight : Array, shape (n_points,)
-        Quadrature weight over the length that the loss is averaged by (base pitch), [-]
+        Quadrature weight over the length that the loss is averaged by (base pitch), times the length of the line of
+        contact over the face width, [-]
     share : Array, shape (n_points,)
         Share of the normal force on this pair of teeth, [-]
     rho_1, rho_2, R : Array, shape (n_points,)
-        Curvature radii of pinion and wheel and the reduced one, [m]
+        Curvature radii of pinion and wheel in the transverse plane, and the reduced one, [m]
+    cos_beta_b : float
+        Cosine of the helix angle at the base circle, [-]
     r_b1 : float
         Base radius of the pinion, [m]
     u : float
@@ -130,6 +133,7 @@ class MeshContact:
     rho_1: Array
     rho_2: Array
     R: Array
+    cos_beta_b: float
     r_b1: float
     u: float
     v_sum_C_per_omega: float
@@ -239,7 +243,9 @@ class MeshContact:
     def _inlet(self, *, omega_1: Array, torque: Array, T_1: Array, T_2: Array) -> Inlet:
         """Loads, speeds and film at every contact point, which follow from the inlet alone."""
         u_1, u_2 = omega_1[:, None] * self.rho_1, (omega_1 / self.u)[:, None] * self.rho_2
-        V_s, V_e = np.abs(u_1 - u_2), 0.5 * (u_1 + u_2)
+        # Flanks slide along the profile; what they carry into the film is across the line of contact.
+        V_s, u_1, u_2 = np.abs(u_1 - u_2), u_1 * self.cos_beta_b, u_2 * self.cos_beta_b
+        V_e = 0.5 * (u_1 + u_2)
         F = (torque / self.r_b1)[:, None] * self.share
         b_H, p_H = ehl.hertz_line(F / self.b, self.R, self.E_red)
         # The bulk temperatures are known, so the surfaces enter the contact with them (Arana eqs. 15-18, M = 0);
@@ -290,9 +296,10 @@ class Inlet:
     Attributes
     ----------
     u_1, u_2, V_s, V_r : Array
-        Surface speeds, sliding speed and sum, [m/s]
+        Surface speeds across the line of contact, sliding speed and sum, [m/s]
     F, b_H, p_H : Array
-        Normal force [N], half width [m] and pressure [Pa] of Hertz
+        Load per length of the line of contact times face width, of spur gears the normal force [N]; half width [m] and
+        pressure [Pa] of Hertz
     h, phi_T : Array
         Film thickness [m], and its thermal reduction [-]
     T_in, k_oil : Array
@@ -341,11 +348,12 @@ def mesh_contact(gearbox: GearboxData) -> MeshContact:
     _, rho_2_C, rho_red_C = pair.curvature_radii(np.asarray(pair.T1C))
     return MeshContact(
         oil=gearbox.lubricant(),
-        weight=dx / averaged_over,
+        weight=dx / averaged_over / np.cos(pair.beta_b),
         share=share,
         rho_1=rho_1,
         rho_2=rho_2,
         R=R,
+        cos_beta_b=float(np.cos(pair.beta_b)),
         r_b1=pair.r_b[0],
         u=pair.u,
         v_sum_C_per_omega=float(pair.T1C + rho_2_C / pair.u),

@@ -15,7 +15,8 @@ from models.assembly.gearbox import Gearbox, load_gearbox
 from models.definition.bearing_section import Bearing
 from models.definition.sections import Churning, Friction, Rolling, Seal, Section, Stage
 
-FZG, CONVEYOR = load_gearbox("fzg"), load_gearbox("conveyor")
+FZG = load_gearbox("fzg")
+OTHERS = {name: load_gearbox(name) for name in ("conveyor", "helical")}
 EVERY_BEARING = range(len(FZG.bearing))
 PLACES: dict[type[Section], list[str]] = {
     Stage: ["stage.0"],
@@ -26,13 +27,19 @@ PLACES: dict[type[Section], list[str]] = {
     Bearing: [f"bearing.{i}" for i in EVERY_BEARING],
 }
 PRINTED = "Churning.model niemann_printed"
+# With gears that push along the shafts, and the bearings that take it; those of the rig's file let the shafts move.
+HELICAL: dict[str, Any] = {
+    "stage.0.helix_angle_deg": 2.0,
+    **{f"bearing.{i}.{key}": value for i in (0, 2) for key, value in (("designation", "NJ 406"), ("locating", True))},
+}
+BALLS: dict[str, Any] = {f"bearing.{i}.designation": "6406" for i in EVERY_BEARING}
 WRITTEN_OUT = "of_the_law"  # the rig's file names the roughness that this is
 # Every choice that a definition offers and the rig's file does not make.
 OPTIONS: dict[str, Mapping[str, Any]] = {
     "default": {},
-    "conveyor": {},
+    **{name: {} for name in OTHERS},
     "roelands": {"oil.pressure_viscosity": "roelands"},
-    "ball bearings": {f"bearing.{i}.designation": "6406" for i in EVERY_BEARING},  # another type has other constants
+    "ball bearings": BALLS,  # another type has other constants
     **{
         f"{section.__name__}.{key} {choice}": {f"{place}.{key}": choice for place in places}
         for section, places in PLACES.items()
@@ -46,7 +53,7 @@ OPTIONS: dict[str, Mapping[str, Any]] = {
 
 @cache
 def gearbox_with(option: str) -> Gearbox:
-    return CONVEYOR if option == "conveyor" else FZG.with_values(OPTIONS[option])
+    return OTHERS[option] if option in OTHERS else FZG.with_values(OPTIONS[option])
 
 
 @cache
@@ -173,7 +180,6 @@ NEEDS: dict[str, Mapping[str, Any]] = {
 # Numbers that describe and do not compute.
 DESCRIBE = {
     "schema": "version of the file",
-    "stage.0.helix_angle_deg": "only 0 is accepted",
     "training.": "range of the surrogate's training points",
 }
 # Numbers that cannot be moved alone, with the change that is valid.
@@ -183,6 +189,7 @@ TOGETHER: dict[str, Mapping[str, Any]] = {
     "stage.0.z.0": {"stage.0.z": (17, 24), "stage.0.profile_shift": (0.0, 0.0), "stage.0.center_distance_mm": 92.25},
     "stage.0.z.1": {"stage.0.z": (16, 25), "stage.0.profile_shift": (0.0, 0.0), "stage.0.center_distance_mm": 92.25},
     "stage.0.module_mm": {"stage.0.module_mm": 4.5 * 1.001, "stage.0.center_distance_mm": 91.5 * 1.001},
+    "stage.0.helix_angle_deg": HELICAL | {"stage.0.helix_angle_deg": 1.0},
     "housing.foundation_conductance_W_K": {"housing.foundation_conductance_W_K": 3.0},
     **{
         f"bearing.{i}.load_share": {f"bearing.{i - i % 2}.load_share": 0.6, f"bearing.{i - i % 2 + 1}.load_share": 0.4}
@@ -191,6 +198,10 @@ TOGETHER: dict[str, Mapping[str, Any]] = {
 }
 # What the rig's file leaves out, and switches.
 OPTIONAL: list[Mapping[str, Any]] = [
+    HELICAL | {"bearing.0.S1": 0.2},
+    HELICAL | {"bearing.1.designation": "NJ 406", "bearing.0.locating": False, "bearing.1.locating": True},
+    HELICAL | BALLS | {"bearing.2.S2": 100.0},
+    HELICAL | BALLS | {"bearing.2.static_load_kN": 20.0},
     {"shaft.0.heat_capacity_J_K": 400.0},
     {"shaft.0.surface_to_air": True},
     {"shaft.0.surface_to_air": True, "shaft.0.length_in_air_mm": 50.0},

@@ -12,7 +12,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from models.base.errors import InputError
-from models.formulas.geometry import GearPair, centre_distance, gear_pair, half_tooth_angle, profile_shift_sum
+from models.formulas.geometry import GearPair, gear_pair
+from models.formulas.involute import centre_distance, half_tooth_angle, profile_shift_sum
 from models.formulas.load_sharing import (
     LoadSharing,
     contact_breakpoints,

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 
-from models.assembly.gearbox import load_gearbox, read_gearbox
+from models.assembly.gearbox import Gearbox, load_gearbox, read_gearbox
 from models.base.errors import InputError
 from models.definition.known_bearings import FILLED, filled_by_designation, known_bearings
 from models.definition.values_with_source import Annotations
@@ -81,10 +82,11 @@ def test_another_type_brings_its_constants() -> None:
     rig = load_gearbox("fzg")
     balls = rig.with_values({f"bearing.{index}.designation": "6406" for index in range(4)})
     assert [(b.type, b.R1, b.S1, b.S2, b.K_Z, b.K_L, b.mu_EHL) for b in balls.bearing] == [
-        ("deep_groove_ball", 3.6e-7, 2.43e-3, None, 3.1, None, 0.05)
+        ("deep_groove_ball", 3.6e-7, 2.43e-3, 198.0, 3.1, None, 0.05)
     ] * 4
     assert {path.split(".")[-1] for path in balls.priors if path.startswith("bearing.0")} >= {"S1", "R1", "mass_kg"}
-    assert "bearing.0.S2" not in balls.priors
+    assert "bearing.0.static_load_kN" not in balls.priors
+    assert balls.bearing[0].static_load_kN == 23.6
     back = balls.with_values({f"bearing.{index}.designation": "NU 406" for index in range(4)})
     assert back.hash == rig.hash
 
@@ -92,3 +94,33 @@ def test_another_type_brings_its_constants() -> None:
 def test_own_friction_of_a_film_stays_with_the_type() -> None:
     rig = load_gearbox("fzg").with_values({"bearing.0.mu_EHL": 0.015})
     assert rig.with_values({"bearing.0.designation": "NU 306"}).bearing[0].mu_EHL == 0.015
+
+
+HELICAL = {"stage.0.helix_angle_deg": 2.0, "bearing.0.locating": True, "bearing.2.locating": True}
+
+
+@pytest.mark.parametrize(
+    ("changes", "fault"),
+    [
+        ({"bearing.0.locating": False}, "bearing: none of those on 'shaft_1' is locating; gears of helix_angle_deg"),
+        ({"bearing.1.locating": True}, "bearing: 2 of those on 'shaft_1' are locating"),
+        ({}, "bearing 'bearing_1'.locating: NU 406 lets the shaft move: an NJ, an NUP or a deep groove ball bearing"),
+        (
+            {"bearing.0.type": "deep_groove_ball", "bearing.0.S1": 0.003, "bearing.0.K_L": None, "bearing.0.S2": None},
+            "bearing 'bearing_1'.locating: S2 of its series (SKF) and static_load_kN",
+        ),
+        (
+            {"bearing.0.designation": "6406", "bearing.0.load_share": 0.0, "bearing.1.load_share": 1.0},
+            "bearing 'bearing_1'.locating: its load_share is 0",
+        ),
+    ],
+)  # fmt: skip
+def test_bearings_that_cannot_take_what_helical_gears_push(changes: dict[str, object], fault: str) -> None:
+    with pytest.raises(InputError, match=re.escape(fault)):
+        load_gearbox("fzg").with_values(HELICAL | changes)
+
+
+def test_bearings_that_can(fzg: Gearbox) -> None:
+    for name in ("NJ 406", "NUP 406 ECP", "6406"):
+        helical = fzg.with_values(HELICAL | {f"bearing.{i}.designation": name for i in (0, 2)})
+        assert [bearing.axial_fault() for bearing in helical.bearing if bearing.locating] == [None, None]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from models.base.errors import InputError
-from models.formulas import geometry
+from models.formulas import involute
 from models.formulas.geometry import GearPair, gear_pair
 
 ALPHA = math.radians(20.0)
@@ -96,7 +96,7 @@ def test_unshifted_pair_is_never_lengthened() -> None:
 
 def test_fzg_type_a_with_its_slight_undercut_is_accepted() -> None:
     pair = gear_pair(**{**TYPE_C, "b": 10e-3, "x": (0.8532, -0.5)})
-    assert pair.x[1] < geometry.smallest_profile_shift(24, ALPHA)
+    assert pair.x[1] < involute.smallest_profile_shift(24, ALPHA)
     assert pair.T1C < pair.T1B  # so the pitch point lies where two pairs carry
 
 
@@ -122,9 +122,9 @@ def test_impossible_pairs_are_refused_with_the_limit(change: dict[str, Any], wor
 
 
 def test_centre_distance_that_no_shift_allows_is_nan() -> None:
-    assert math.isnan(geometry.centre_distance((16, 24), 4.5e-3, ALPHA, -5.0))
+    assert math.isnan(involute.centre_distance((16, 24), 4.5e-3, ALPHA, -5.0))
 
 
 def test_half_tooth_angle_below_the_base_circle_is_that_of_the_base_circle() -> None:
     at: dict[str, Any] = {"z": 16, "x": 0.182, "alpha_n": ALPHA, "r_b": 33.8289e-3}
-    assert geometry.half_tooth_angle(**at, r=31e-3) == geometry.half_tooth_angle(**at, r=33.8289e-3)
+    assert involute.half_tooth_angle(**at, r=31e-3) == involute.half_tooth_angle(**at, r=33.8289e-3)

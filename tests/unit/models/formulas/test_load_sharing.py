@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
 
 from models.base.errors import InputError
+from models.formulas import load_sharing
 from models.formulas.geometry import GearPair, gear_pair
+from models.formulas.involute import centre_distance
 from models.formulas.load_sharing import (
     LoadSharing,
     contact_breakpoints,
@@ -118,3 +120,52 @@ def test_coinciding_breakpoints_are_one(high: GearPair) -> None:
     assert pytest.approx(pair.T1C, rel=1e-12) == pair.T1B
     assert contact_breakpoints(pair) == pytest.approx([pair.T1A, pair.T1C, pair.T1D, pair.T1E])
     assert np.all(contact_points(pair).dx > 1e-9)
+
+
+def helical(beta_deg: float = 15.0, b: float = 23e-3) -> GearPair:
+    """H501 of GEARpie, with another helix angle its sum of profile shifts at this centre distance is not kept."""
+    beta = math.radians(beta_deg)
+    z, m_n, x = (20, 30), 3.5e-3, (0.1809, 0.0891)
+    return gear_pair(z=z, m_n=m_n, alpha_n=ALPHA, beta=beta, b=b, a=centre_distance(z, m_n, ALPHA, sum(x), beta), x=x)
+
+
+@pytest.mark.parametrize("model", get_args(LoadSharing))
+@pytest.mark.parametrize("beta_deg", [5.0, 15.0, 30.0])
+def test_lines_of_contact_carry_the_whole_force(model: LoadSharing, beta_deg: float) -> None:
+    points = contact_points(helical(beta_deg), model=model)
+    carried = np.sum(points.share * points.dx) / helical(beta_deg).p_b
+    assert carried == pytest.approx(1.0, abs=1e-3)
+    assert np.sum(points.dx) == pytest.approx(helical(beta_deg).T1E - helical(beta_deg).T1A, rel=1e-12)
+
+
+def test_uniform_load_where_the_lines_have_a_constant_length() -> None:
+    """Overlap ratio 1: ``pi (u + 1) / (z_1 u cos(beta_b)) (eps_1^2 + eps_2^2) / eps_alpha`` (Velex, Ville 2009)."""
+    pair = helical(b=math.pi * 3.5e-3 / math.sin(math.radians(15.0)))
+    assert pair.epsilon_beta == pytest.approx(1.0, abs=1e-12)
+    closed = math.pi * (pair.u + 1.0) / (pair.z[0] * pair.u * math.cos(pair.beta_b))
+    closed *= (pair.epsilon_1**2 + pair.epsilon_2**2) / pair.epsilon_alpha
+    points = contact_points(pair, model="equal")
+    assert points.share == pytest.approx(1.0 / pair.epsilon_alpha, rel=1e-9)
+    assert load_sharing_loss_factor(pair, points) == pytest.approx(closed, rel=1e-9)
+
+
+@pytest.mark.parametrize("model", get_args(LoadSharing))
+def test_a_small_helix_angle_is_a_spur_gear(model: LoadSharing) -> None:
+    spur, nearly = helical(0.0), helical(0.01)
+    factors = [load_sharing_loss_factor(pair, contact_points(pair, model=model)) for pair in (spur, nearly)]
+    assert factors[1] == pytest.approx(factors[0], rel=2e-3)
+
+
+@pytest.mark.parametrize(("beta_deg", "b"), [(0.01, 23e-3), (5.0, 10e-3), (12.0, 40e-3), (15.0, 23e-3), (30.0, 60e-3)])
+def test_points_on_the_lines_are_enough(monkeypatch: pytest.MonkeyPatch, beta_deg: float, b: float) -> None:
+    """Within 0.2 % of 12 x 12 points between kinks and no merging, also with an exponent above 1 on the load."""
+
+    def weighed(exponent: float) -> float:
+        pair = helical(beta_deg, b)
+        points = contact_points(pair)
+        return float(np.sum(points.share**exponent * pair.sliding_speed(points.t, 1.0) * points.dx))
+
+    coarse = [weighed(exponent) for exponent in (1.0, 1.2)]
+    monkeypatch.setattr(load_sharing, "_GAUSS", 12)
+    monkeypatch.setattr(load_sharing, "_two_points", lambda values, weights: (values, weights))
+    assert coarse == pytest.approx([weighed(exponent) for exponent in (1.0, 1.2)], rel=2e-3)

@@ -10,7 +10,8 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from models.formulas.geometry import GearPair, gear_pair, half_tooth_angle
+from models.formulas.geometry import GearPair, gear_pair
+from models.formulas.involute import half_tooth_angle
 from models.formulas.mesh_stiffness import (
     foundation_compliance,
     hertz_compliance,
@@ -63,7 +64,7 @@ def test_tooth_compliance_against_brute_force(pair: GearPair, gear: int, fractio
     rho = (t, pair.T1T2 - t)[gear]
     ours = tooth_compliance(
         rho / pair.r_b[gear],
-        psi_b=pair.base_half_angle(gear),
+        psi_b=pair.virtual_tooth(gear)[0],
         r_b=pair.r_b[gear],
         r_f=pair.r_f[gear],
         b=pair.b,
@@ -79,7 +80,7 @@ def test_many_teeth_have_their_root_above_the_base_circle() -> None:
     assert pair.r_f[0] > pair.r_b[0]
     ours = tooth_compliance(
         pair.T1E / pair.r_b[0],
-        psi_b=pair.base_half_angle(0),
+        psi_b=pair.virtual_tooth(0)[0],
         r_b=pair.r_b[0],
         r_f=pair.r_f[0],
         b=pair.b,

@@ -132,3 +132,41 @@ def test_outlet_mode_is_finite_everywhere() -> None:
     loss = OUTLET.loss(n_rpm=n, F_r=F, T_oil=T_oil, T_bearing=T_bearing, oil=OIL)
     assert np.all(np.isfinite(loss))
     assert np.all(loss > 0.0)
+
+
+BALLS = SkfBearing(type="deep_groove_ball", d=40, D=80, B=18, H=0, mass=0.37, R1=3.9e-7, S=3.23e-3, K_rs=3e-8, K_Z=3.1,
+                   K_L=0.0, mu_bl=0.12, mu_EHL=0.05, axial=500.0 / 1500.0, S_axial=36.5, C_0=19e3)  # fmt: skip
+ROLLERS = SkfBearing(type="cylindrical_roller", d=50, D=90, B=23, H=0, mass=0.56, R1=1.4e-6, S=1.5e-3, K_rs=3e-8,
+                     K_Z=5.1, K_L=0.65, mu_bl=0.12, mu_EHL=0.02, axial=1000.0 / 6000.0, S_axial=0.16)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("bearing", "F_r", "M_rr", "M_sl"), [(BALLS, 1500.0, 80.303, 21.370), (ROLLERS, 6000.0, 340.0, 160.25)]
+)
+def test_worked_cases_with_an_axial_load(bearing: SkfBearing, F_r: float, M_rr: float, M_sl: float) -> None:
+    """A 6208 with 500 N along the shaft and an NJ 2210 with 1000 N, at 1500 1/min and 32 mm2/s."""
+    found = bearing.friction_moments(n_rpm=1500.0, F_r=F_r, nu=32.0)
+    assert [float(moment) for moment in found[:2]] == pytest.approx([M_rr, M_sl], rel=1e-4)
+
+
+@pytest.mark.parametrize("bearing", [BALLS, ROLLERS])
+def test_an_axial_load_costs_friction(bearing: SkfBearing) -> None:
+    free, loaded = (
+        [float(m) for m in replace(bearing, axial=axial).friction_moments(n_rpm=1500.0, F_r=2000.0, nu=32.0)]
+        for axial in (0.0, 0.2)
+    )
+    assert loaded[1] > 1.1 * free[1]
+    assert loaded[0] >= free[0]
+
+
+def test_the_locating_bearing_takes_the_axial_force() -> None:
+    """F_bt tan(beta_b) over its radial load; the others of the shaft have none, and spur gears make none."""
+    helical = load_gearbox("helical")
+    pair = helical.stage[0].pair()
+    axial = {term.name: term.law.bearing.axial for term in helical.losses().terms if term.kind.name == "bearing"}
+    assert axial["input_motor_side"] == axial["output_pump_side"] == 0.0
+    # T tan(beta) / r by the reference circle is the same force.
+    of_reference = np.tan(pair.beta) / pair.r[0] * pair.r_b[0] / 0.5
+    assert axial["input_far_side"] == axial["output_far_side"] == pytest.approx(of_reference, rel=1e-12)
+    spur = GEARBOX.with_values({"bearing.0.locating": True}).losses()
+    assert spur.term("bearing_1").law.bearing.axial == 0.0
