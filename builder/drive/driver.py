@@ -265,7 +265,10 @@ def loaded(path: Path) -> Iterator[LoadedFmu]:
     """
     path = Path(path)
     fmu = LoadedFmu(path, description_of(path))
-    with tempfile.TemporaryDirectory(prefix="twin-fmu-") as folder, _logged_to(fmu.messages) as callbacks:
+    with (
+        tempfile.TemporaryDirectory(prefix="twin-fmu-", ignore_cleanup_errors=True) as folder,
+        _logged_to(fmu.messages) as callbacks,
+    ):
         with damage_reported(path):
             fmpy.extract(str(path), folder)
         identifier = fmu.description.coSimulation.modelIdentifier

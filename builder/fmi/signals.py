@@ -128,7 +128,7 @@ class SignalTable:
     Raises
     ------
     InputError
-        If two signals have the same name.
+        If two signals have the same name, or one is the beginning of another's: no record can hold both.
     """
 
     def __init__(self, signals: Sequence[Signal]) -> None:
@@ -137,6 +137,8 @@ class SignalTable:
         for name in names:
             if names.count(name) > 1:
                 raise InputError(f"two signals of the FMU would be called {name!r}; rename a node, source or parameter")
+            if longer := next((other for other in names if other.startswith(f"{name}.")), None):
+                raise InputError(f"the FMU would have the signals {name!r} and {longer!r}; rename a node or an input")
 
     def __iter__(self) -> Iterator[Signal]:
         return iter(self.signals)
@@ -396,7 +398,8 @@ class _Table:
         if not self.loss_heats or not {"speed", "torque"} <= set(self.inputs):
             return
         yield self._output(name="torque_loss", role="torque_loss", kind="Torque", expression=total / symbol("speed"),
-                           description="Loss torque at the input shaft, signed as the speed")  # fmt: skip
+                           description="Loss torque at the input shaft, signed as the speed; the output shaft has the "
+                                       "gear ratio times (torque - torque_loss)")  # fmt: skip
         yield self._output(name="efficiency", role="efficiency", kind="Ratio", minimum=0.0, maximum=1.0,
                            expression=total + symbol("speed") * symbol("torque"),
                            description="Power out over power in; 0 without power")  # fmt: skip

@@ -289,7 +289,9 @@ def _own_compiler() -> Compiler | None:
     """
     named = os.environ.get("CC")
     try:
-        own = [tuple(shlex.split(named))] if named else [("cc",), ("gcc",), ("clang",)]
+        # Backslashes are part of a path on Windows.
+        words = [word.strip('"') for word in shlex.split(named, posix=os.name != "nt")] if named else []
+        own = [tuple(words)] if named else [("cc",), ("gcc",), ("clang",)]
     except ValueError as error:
         raise InputError(f"CC is {named!r}, which cannot be read ({error}); correct it or unset it") from error
     for command in own:

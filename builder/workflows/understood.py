@@ -50,11 +50,16 @@ def understood(gearbox: Gearbox) -> list[Grid]:
 
 def _gears(gearbox: Gearbox) -> Grid:
     stage, level = gearbox.stage[0], gearbox.oil.level_below_axis
+    pair, (_, torque) = stage.pair(), _largest(gearbox)
     rows = [
         [name, f"{2e3 * r_a:.1f}", f"{1e3 * (r_a - level):.1f}" if r_a > level else "not at all"]
-        for name, r_a in zip(stage.names, stage.pair().r_a, strict=True)
+        for name, r_a in zip(stage.names, pair.r_a, strict=True)
     ]
-    return Grid(f"Gears; oil {1e3 * level:g} mm below their axes", ["gear", "tip diameter, mm", "dips, mm"], rows)
+    title = f"Gears; contact ratio {pair.epsilon_alpha:.3f}; oil {1e3 * level:g} mm below their axes"
+    if pair.epsilon_beta > 0.0:
+        push = torque / pair.r_b[0] * math.tan(pair.beta_b)
+        title += f"\n(overlap ratio {pair.epsilon_beta:.3f}; they push along their shafts with {push:.4g} N at {torque:g} N m)"
+    return Grid(title, ["gear", "tip diameter, mm", "dips, mm"], rows)
 
 
 def conductances(gearbox: Gearbox, network: ThermalNetwork) -> dict[str, float]:

@@ -41,6 +41,7 @@ RESERVED = (
     *BOUNDARY_NODES,
     "oil",
     "mesh",
+    "T",
     *loss_components(),
     "total",
     "initial",
@@ -50,6 +51,7 @@ RESERVED = (
     "gears",
 )
 SHARE_TOLERANCE = 1e-6
+STEPPED = 3.0  # ratio of diameters on one shaft
 
 
 class Definition(Section):
@@ -111,7 +113,8 @@ class Definition(Section):
         faults = [*_duplicate_names(self), *_unknown_names(self)]
         # What follows reads the tables by their names.
         faults = faults or [
-            *_load_shares(self), *_axial_loads(self), *_shafts_in_gears(self), *_oil_level(self), *_oil_volume(self),
+            *_load_shares(self), *_axial_loads(self), *_shafts_in_gears(self), *_seals_on_shafts(self),
+            *_gears_in_housing(self), *_oil_level(self), *_oil_volume(self),
         ]  # fmt: skip
         if faults:
             raise ValueError("\n".join(faults))
@@ -195,6 +198,29 @@ def _shafts_in_gears(definition: Definition) -> Iterator[str]:
                     f"shaft '{shaft}'.diameter_mm: {diameters[shaft]:g} mm is not below the root diameter "
                     f"{2e3 * r_f:.4g} mm of the gear '{gear}' on it"
                 )
+
+
+def _seals_on_shafts(definition: Definition) -> Iterator[str]:
+    """Refuse seals that no station of their shaft can have."""
+    diameters = {shaft.name: shaft.diameter_mm for shaft in definition.shaft}
+    for seal in definition.seal:
+        ratio = seal.diameter_mm / diameters[seal.shaft]
+        if not 1.0 / STEPPED < ratio < STEPPED:
+            yield (
+                f"seal '{seal.name}'.diameter_mm: {seal.diameter_mm:g} mm on a shaft of {diameters[seal.shaft]:g} mm; "
+                f"up to {STEPPED:g} times thicker or thinner is accepted"
+            )
+
+
+def _gears_in_housing(definition: Definition) -> Iterator[str]:
+    """Refuse a housing that is lower than its largest gear."""
+    height = definition.housing.height_m
+    largest = 2.0 * max(definition.stage[0].pair().r_a)
+    if height < largest:
+        yield (
+            f"housing.height_m: {height:g} m is less than the tip diameter of the largest gear, {largest:.4g} m: "
+            "correct one of them"
+        )
 
 
 def _oil_level(definition: Definition) -> Iterator[str]:

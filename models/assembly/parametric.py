@@ -15,6 +15,7 @@ from models.base.types import Array
 from models.definition.parametric_sections import Heat, Loss, ParametricDefinition, Path, TorqueFromPower
 from models.formulas.extremes import Max, Min
 from models.formulas.oil import T_HIGHEST, T_LOWEST, kinematic_viscosity_d341
+from models.losses.loss_model import refuse_unphysical
 from models.network.expressions import parse_expression
 from models.network.laws import Parameter, compile_each, symbol
 from models.portable.evaluation import RPM
@@ -65,9 +66,16 @@ class ParametricLosses:
         return tuple(frozenset({loss.part}) for loss in self.definition.loss for _ in kinds_of(loss))
 
     def power(self, speed: ArrayLike, torque: ArrayLike, temperatures: ArrayLike) -> Array:
-        """Losses [W], shape (..., components), at speed [1/min], torque [N m] and temperatures [degC]."""
+        """Losses [W], shape (..., components), at speed [1/min], torque [N m] and temperatures [degC].
+
+        Raises
+        ------
+        InputError
+            If an input is not finite or a temperature below absolute zero.
+        """
         reference, nodes = self.definition.operation, self.temperature_nodes
         T = np.asarray(temperatures, dtype=float)
+        refuse_unphysical(np.ravel(speed), np.ravel(torque), T.reshape(-1, len(nodes)), nodes)
         n = np.abs(np.asarray(speed, dtype=float)) / reference.speed_rpm
         m = np.abs(np.asarray(torque, dtype=float)) / reference.torque_Nm
         constants = self.definition.viscosity_constants

@@ -21,7 +21,7 @@ def atomic_file(path: Path) -> Iterator[Path]:
     Raises
     ------
     InputError
-        If the folder cannot be made or written to.
+        If the folder cannot be made or written to, or `path` cannot be replaced: what was written is kept next to it.
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -31,11 +31,21 @@ def atomic_file(path: Path) -> Iterator[Path]:
         raise InputError(f"{path}: cannot be written ({error.strerror}); choose another output") from error
     partial = Path(name)
     try:
-        yield partial
+        try:
+            yield partial
+        except OSError as error:  # a full disk
+            raise InputError(f"{path}: cannot be written ({error.strerror or error}); choose another output") from error
         if path.is_dir():
             raise InputError(f"{path}: is a folder; name a file")
         partial.chmod(0o644)
-        partial.replace(path)
+        try:
+            partial.replace(path)
+        except OSError as error:  # on Windows, where a spreadsheet holds it open
+            kept = partial.rename(path.with_name(f"{path.stem}_{partial.stem.rpartition('.')[2]}{path.suffix}"))
+            raise InputError(
+                f"{path}: cannot be replaced ({error.strerror}); it was written as {kept.name} next to it. Close what "
+                "holds the old one open, or choose another output"
+            ) from error
     finally:
         partial.unlink(missing_ok=True)
 

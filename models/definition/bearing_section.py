@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from typing import Annotated, Any, Literal, Self
 
@@ -10,6 +11,8 @@ from pydantic import Field, model_validator
 from models.definition.sections import Coefficient, Name, Section, Text
 from models.quantities.definition_units import between
 
+STEEL = 7850e-9  # kg/mm3
+HEAVIEST = 3.0  # times a solid ring of steel: with the seat around it
 LARGEST_RING_RATIO = 5.0  # outside diameter over bore; the largest of ISO 15, from memory, is 4 (634: 16 over 4 mm)
 # Constants of SKF's friction model by type of bearing: those that a file may leave out, and that of sliding under a
 # radial load, which it gives by the series. SKF, "Rolling bearings", 2016; mineral oil.
@@ -113,5 +116,10 @@ class Bearing(Section):
             raise ValueError(
                 f"outside_diameter_mm = {outside:g} is {outside / bore:.3g} times bore_mm = {bore:g}; rolling bearings "
                 f"have up to 4 times, above {LARGEST_RING_RATIO:g} is refused: correct one of them"
+            )
+        solid = STEEL * math.pi / 4.0 * (outside**2 - bore**2) * self.width_mm
+        if self.mass_kg > HEAVIEST * solid:
+            raise ValueError(
+                f"mass_kg = {self.mass_kg:g}, but a solid ring of steel of its size has {solid:.3g} kg: correct it"
             )
         return self

@@ -274,6 +274,8 @@ def _names(definition: ParametricDefinition) -> Iterator[str]:
     for what, tables in (("loss", definition.loss), ("heat", definition.heat)):
         repeated = Counter(one.name for one in tables)
         yield from (f"{what}: '{name}' is given {count} times" for name, count in repeated.items() if count > 1)
+        if "T" in repeated:
+            yield f"{what}: the name 'T' is that of temperatures; choose another"
     signals = (*(given.name for given in definition.input), *(p.name for p in definition.parameter))
     yield from (f"'{name}' has a meaning in formulas; give the input or parameter another name" for name in signals
                 if iskeyword(name) or name in ("pi", "math", "numpy"))  # fmt: skip

@@ -36,7 +36,7 @@ OneOrMore = Annotated[tuple[T, ...], AfterValidator(_at_least_one)]
 Positive = Annotated[float, Field(gt=0.0, le=1e9)]
 NotNegative = Annotated[float, Field(ge=0.0, le=1e9)]
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
-Text = Annotated[str, StringConstraints(min_length=1)]
+Text = Annotated[str, StringConstraints(min_length=1, pattern=r"^[^\x00-\x08\x0b\x0c\x0e-\x1f]*$")]  # as XML
 # A whole number of hundreds of digits, which no float holds, is refused before anything is calculated with it.
 Teeth = Annotated[int, Field(ge=-(10**9), le=10**9), between(5, 400)]
 ThermalConductivity = Annotated[float, between(0.1, 500.0)]
@@ -381,6 +381,15 @@ class Housing(Section):
         total = sum(part.area_fraction for part in self.part)
         if abs(total - 1.0) > 1e-6:
             raise ValueError(f"the area_fraction of its parts sum to {total:g}, not to 1")
+        return self
+
+    @model_validator(mode="after")
+    def _inside_is_not_larger(self) -> Self:
+        if self.inside_area_m2 > self.outside_area_m2:
+            raise ValueError(
+                f"inside_area_m2 = {self.inside_area_m2:g} is above outside_area_m2 = {self.outside_area_m2:g}; a box "
+                "has more area outside: correct one of them"
+            )
         return self
 
     @model_validator(mode="after")

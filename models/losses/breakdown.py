@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from models.base.errors import InputError, did_you_mean
+from models.base.shapes import common_shape
 from models.base.types import Numeric
 from models.columns.columns import Columns
 from models.network.structure import Losses
@@ -99,6 +100,7 @@ def break_down(
     missing = [name for name in nodes if name not in temperatures]
     if missing:
         raise InputError(f"the temperatures of {', '.join(missing)} are missing; give them in degC")
+    common_shape({"speed": speed, "torque": torque, **{f"T_{name}": temperatures[name] for name in nodes}})
     columns = np.broadcast_arrays(*(np.asarray(temperatures[name], dtype=float) for name in nodes))
     power = losses.power(speed, torque, np.stack(columns, axis=-1))
 

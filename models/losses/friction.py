@@ -345,7 +345,7 @@ def mesh_contact(gearbox: GearboxData) -> MeshContact:
     t, dx, share = contact_points(pair, model=stage.load_sharing, r_bore=stage.bore_radius, E=E, nu=nu)
     rho_1, rho_2, R = pair.curvature_radii(t)
     averaged_over = pair.p_b if friction.average == "base_pitch" else pair.T1E - pair.T1A
-    _, rho_2_C, rho_red_C = pair.curvature_radii(np.asarray(pair.T1C))
+    _, rho_2_C, _ = pair.curvature_radii(np.asarray(pair.T1C))
     return MeshContact(
         oil=gearbox.lubricant(),
         weight=dx / averaged_over / np.cos(pair.beta_b),
@@ -357,7 +357,7 @@ def mesh_contact(gearbox: GearboxData) -> MeshContact:
         r_b1=pair.r_b[0],
         u=pair.u,
         v_sum_C_per_omega=float(pair.T1C + rho_2_C / pair.u),
-        rho_red_C=float(rho_red_C),
+        rho_red_C=pair.rho_red_C,
         b=pair.b,
         E_red=ehl.reduced_modulus(E[0], nu[0], E[1], nu[1]),
         k_steel=material.conductivity_W_mK,

@@ -127,7 +127,7 @@ class LossModel:
         shape = n.shape
         T = np.broadcast_to(T, (*shape, T.shape[-1])).reshape(-1, T.shape[-1])
         n, torque = n.reshape(-1), torque.reshape(-1)
-        _refuse_unphysical(n, torque, T, self.temperature_nodes)
+        refuse_unphysical(n, torque, T, self.temperature_nodes)
         power = np.empty((len(n), len(self.components)))
         for begin in range(0, len(n), BATCH):
             rows = slice(begin, begin + BATCH)
@@ -156,7 +156,21 @@ class LossModel:
         return np.zeros(np.broadcast_shapes(np.shape(speed), np.shape(torque), np.shape(temperatures)[:-1]))
 
 
-def _refuse_unphysical(n: Array, torque: Array, T: Array, nodes: tuple[str, ...]) -> None:
+def refuse_unphysical(n: Array, torque: Array, T: Array, nodes: tuple[str, ...]) -> None:
+    """Refuse operating points that no machine has.
+
+    Parameters
+    ----------
+    n, torque : Array, shape (N,)
+        [1/min], [N m]
+    T : Array, shape (N, nodes)
+        [degC]
+
+    Raises
+    ------
+    InputError
+        If a value is not finite or a temperature below absolute zero.
+    """
     for name, unit, values in (("speed", "1/min", n), ("torque", "N m", torque)):
         if not np.isfinite(values).all():
             row = int(np.flatnonzero(~np.isfinite(values))[0])

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from models.base.errors import InputError, did_you_mean
+from models.base.shapes import common_shape
 from models.base.types import Array, Numeric
 from models.definition.sections import Training
 from models.network.structure import Losses, Network
@@ -73,10 +74,9 @@ def steady_state(
     if network.states:
         raise InputError("a network with laws that have a memory has no steady state; simulate a long cycle instead")
     columns = _inputs(network, speed, torque, inputs or {})
-    shapes = [np.shape(c) for c in columns] + [np.shape(v) for v in (parameters or {}).values()]
-    shape = np.broadcast_shapes(*shapes)
-    if len(shape) > 1:
-        raise InputError(f"inputs and parameters give an array of shape {shape}; one axis at most is possible")
+    shape = common_shape({**dict(zip(network.inputs, columns, strict=True)), **(parameters or {})})
+    if len(shape) > 1 or 0 in shape:
+        raise InputError(f"inputs and parameters give an array of shape {shape}; one axis of at least one is possible")
     rows = np.broadcast_shapes(shape, (1,))
     table = np.stack([np.broadcast_to(np.asarray(c, dtype=float), rows) for c in columns], axis=-1)
     wide = {p.name: np.broadcast_to(np.asarray((parameters or {}).get(p.name, p.start), float), rows)

@@ -123,3 +123,10 @@ def test_nomenclature_has_one_line_per_signal(table: SignalTable) -> None:
 def test_the_domain_is_that_of_the_networks(fzg: Gearbox, fzg_training: TrainingResult) -> None:
     losses = replace(fzg_training.losses, temperature_bounds=(20.0, 120.0))
     assert signal_table(fzg.network(), losses)["oil.T"].domain == pytest.approx((293.15, 393.15))
+
+
+def test_a_name_that_begins_another_is_refused(table: SignalTable) -> None:
+    """Under structured names ``speed`` cannot be a number and a record."""
+    clash = replace(table["oil.T"], name="speed.T")
+    with pytest.raises(InputError, match=r"the FMU would have the signals 'speed' and 'speed\.T'; rename a node"):
+        SignalTable([*table.signals, clash])

@@ -55,6 +55,7 @@ def test_it_is_one_of_the_gearboxes_and_knows_what_it_lacks(gearbox):
         ('between = ["casing", "outdoor"]', 'between = ["casing", "casing"]', "with itself"),
         ('part = "bearing_1"', 'part = "bearing_9"', "no part 'bearing_9'"),
         ('name = "bearing_2"\nheat', 'name = "bearing_1"\nheat', "given 2 times"),
+        ('name = "gears"', 'name = "T"', "loss: the name 'T' is that of temperatures; choose another"),
         ('input = "T_ambient"', 'input = "T_nacelle"', "none has input = 'T_ambient'"),
         ("speed_exponent = { value = 1.8", "speed_exponent = { value = 18.0", "speed_exponent"),
         ("no_load_W = { value = 8000.0", "no_loads_W = { value = 8000.0", "'no_loads_W' is not a known key"),
@@ -101,6 +102,16 @@ def test_losses_are_what_the_definition_states_at_the_reference(gearbox):
     assert not losses.power(0.0, 5000.0, T).any()  # nothing turns, nothing is lost
     cold = losses.power(1800.0, 10900.0, T - 40.0)
     assert cold[0] > 1.3 * at["gears_no_load"] and cold[1] == at["gears_load"]
+
+
+def test_operating_points_that_no_machine_has_are_refused(gearbox):
+    """As with geometry."""
+    at = {"speed": 1500.0, "torque": 5000.0, "temperatures": 60.0}
+    for name, value in (("speed", np.nan), ("torque", np.inf), ("temperatures", -300.0)):
+        with pytest.raises(InputError, match="at operating point 0; finite numbers"):
+            gearbox.losses_at(**at | {name: value})
+    with pytest.raises(InputError, match="numbers of values differ: speed 2, torque 3"):
+        gearbox.losses_at(speed=[1.0, 2.0], torque=[1.0, 2.0, 3.0], temperatures=60.0)
 
 
 def test_each_loss_reads_the_part_that_it_warms():

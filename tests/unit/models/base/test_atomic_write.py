@@ -117,3 +117,27 @@ def test_a_file_in_the_place_of_a_folder_is_told(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="networks: cannot be written"):
         make(tmp_path, "a.csv", "networks/mesh.onnx")
     assert written(tmp_path) == {"networks": "mine"}
+
+
+def test_a_file_that_is_held_open_keeps_the_new_one_next_to_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As on Windows, where a spreadsheet holds a result open: hours of simulation are not lost."""
+    path = tmp_path / "a.csv"
+    path.write_text("old")
+
+    def held(self: Path, target: Path) -> Path:
+        raise PermissionError(13, "Permission denied", str(target))
+
+    monkeypatch.setattr(Path, "replace", held)
+    with pytest.raises(InputError, match=r"a\.csv: cannot be replaced \(Permission denied\); it was written as a_"):
+        with atomic_file(path) as partial:
+            partial.write_text("new")
+    kept = sorted(found.name for found in tmp_path.iterdir())
+    assert len(kept) == 2 and path.read_text() == "old"
+    assert (tmp_path / kept[1]).suffix == ".csv" and (tmp_path / kept[1]).read_text() == "new"
+
+
+def test_a_full_disk_is_one_line(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"a\.csv: cannot be written \(No space left on device\); choose another"):
+        with atomic_file(tmp_path / "a.csv"):
+            raise OSError(28, "No space left on device")
+    assert list(tmp_path.iterdir()) == []

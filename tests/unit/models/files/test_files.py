@@ -169,3 +169,18 @@ def test_a_recorded_start_that_is_missing(tmp_path: Path) -> None:
     empty = recorded(tmp_path / "empty.csv", T_oil_degC=[None] * 3)
     with pytest.raises(InputError, match="needs a column"):
         read_cycle_and_start(empty)[1].of(["oil"])
+
+
+def test_small_numbers_keep_their_digits(tmp_path: Path) -> None:
+    """A flow in m3/s, or what a law remembers: the file is read again as a cycle and as a start."""
+    given = {
+        "time_s": [0.0, 1.0],
+        "oil_flow": [2.345678e-7, np.nan],
+        "state_x": [0.0, 0.0],
+        "P_loss_W": [512.12345678, 1.0],
+    }
+    write_table(tmp_path / "a.csv", given)
+    read = pd.read_csv(tmp_path / "a.csv")
+    assert read["oil_flow"][0] == pytest.approx(2.345678e-7, rel=1e-6)
+    assert np.isnan(read["oil_flow"][1])
+    assert read["P_loss_W"].tolist() == [512.123457, 1.0]

@@ -104,8 +104,9 @@ def test_torque_loss_and_efficiency() -> None:
     ("arguments", "says"),
     [
         ({"parameters": {"h_aire": 1.0}}, "'h_aire' is not a parameter of this network; did you mean 'h_air'"),
-        ({"parameters": {"C_oil": 0.0}}, "heat capacities must be positive"),
-        ({"parameters": {"C_oil": np.array([1.0, -1.0])}}, "heat capacities must be positive"),
+        ({"parameters": {"C_oil": 0.0}}, "parameter 'C_oil' is 0.0; 0.05 to 20 is possible"),
+        ({"parameters": {"bearing": np.array([1.0, -5.0])}}, r"parameter 'bearing' is \[ 1. -5.\]; 0.05 to 20 is"),
+        ({"parameters": {"bearing": np.nan}}, "parameter 'bearing' is nan"),
         ({"initial": {"oil": 20.0}}, "start temperatures are missing for: housing_lower"),
         ({"initial": {"oill": 20.0}}, "unknown node 'oill'; did you mean 'oil'"),
         ({"initial": np.nan}, "a finite number above -273.15 degC"),
@@ -149,8 +150,14 @@ def test_a_steady_state_outside_the_range_of_the_definition_is_not_in_its_domain
 def test_steady_state_refusals() -> None:
     with pytest.raises(InputError, match="'T_ambiente' is not an input of this network; did you mean 'T_ambient'"):
         NETWORK.steady_state(losses=LOSSES, speed=1.0, torque=1.0, inputs={"T_ambiente": 3.0})
-    with pytest.raises(InputError, match="one axis at most"):
+    with pytest.raises(InputError, match="one axis of at least one is possible"):
         NETWORK.steady_state(losses=LOSSES, speed=np.ones((2, 2)), torque=1.0)
+    with pytest.raises(InputError, match="one axis of at least one is possible"):
+        NETWORK.steady_state(losses=LOSSES, speed=[], torque=1.0)
+    with pytest.raises(InputError, match="numbers of values differ: speed 2, torque 3; give single numbers"):
+        NETWORK.steady_state(losses=LOSSES, speed=[1.0, 2.0], torque=[1.0, 2.0, 3.0])
+    with pytest.raises(InputError, match="bearing' is .*; 0.05 to 20 is possible"):
+        NETWORK.steady_state(losses=LOSSES, speed=1.0, torque=1.0, parameters={"bearing": -5.0})
     with pytest.raises(InputError, match="have a memory has no steady state"):
         NETWORK.with_state("age", start=0.0, rate=1.0).steady_state(losses=LOSSES, speed=1.0, torque=1.0)
     lonely = NETWORK.with_node("tank", 100.0).with_source("tank", 5.0, name="heater")
