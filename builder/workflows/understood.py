@@ -58,7 +58,7 @@ def _gears(gearbox: Gearbox) -> Grid:
     title = f"Gears; contact ratio {pair.epsilon_alpha:.3f}; oil {1e3 * level:g} mm below their axes"
     if pair.epsilon_beta > 0.0:
         push = torque / pair.r_b[0] * math.tan(pair.beta_b)
-        title += f"\n(overlap ratio {pair.epsilon_beta:.3f}; they push along their shafts with {push:.4g} N at {torque:g} N m)"
+        title += f"\n(overlap ratio {pair.epsilon_beta:.3f}; {push:.4g} N along the shafts at {torque:g} N m)"
     return Grid(title, ["gear", "tip diameter, mm", "dips, mm"], rows)
 
 

@@ -128,16 +128,16 @@ def test_a_file_that_is_held_open_keeps_the_new_one_next_to_it(tmp_path: Path, m
         raise PermissionError(13, "Permission denied", str(target))
 
     monkeypatch.setattr(Path, "replace", held)
-    with pytest.raises(InputError, match=r"a\.csv: cannot be replaced \(Permission denied\); it was written as a_"):
-        with atomic_file(path) as partial:
-            partial.write_text("new")
+    named = r"a\.csv: cannot be replaced \(Permission denied\); it was written as a_"
+    with pytest.raises(InputError, match=named), atomic_file(path) as partial:
+        partial.write_text("new")
     kept = sorted(found.name for found in tmp_path.iterdir())
     assert len(kept) == 2 and path.read_text() == "old"
     assert (tmp_path / kept[1]).suffix == ".csv" and (tmp_path / kept[1]).read_text() == "new"
 
 
 def test_a_full_disk_is_one_line(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"a\.csv: cannot be written \(No space left on device\); choose another"):
-        with atomic_file(tmp_path / "a.csv"):
-            raise OSError(28, "No space left on device")
+    named = r"a\.csv: cannot be written \(No space left on device\); choose another"
+    with pytest.raises(InputError, match=named), atomic_file(tmp_path / "a.csv"):
+        raise OSError(28, "No space left on device")
     assert list(tmp_path.iterdir()) == []
