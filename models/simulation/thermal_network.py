@@ -14,6 +14,7 @@ from difflib import get_close_matches
 from keyword import iskeyword
 from math import inf
 
+import numpy as np
 import sympy as sp
 from numpy.typing import ArrayLike
 
@@ -389,7 +390,14 @@ class ThermalNetwork(Network):
         trained: Training | None = None,
         progress: Callable[[int, int], None] | None = None,
     ) -> Result:
-        """Temperatures and losses over a cycle; see :func:`models.simulation.simulate.simulate`."""
+        """Temperatures and losses over a cycle; see :func:`models.simulation.simulate.simulate`.
+
+        Raises
+        ------
+        InputError
+            Also if a parameter is outside its bounds.
+        """
+        self._refuse_outside_bounds(parameters or {})
         return simulate(
             self, cycle, losses=losses, initial=initial, parameters=parameters, trained=trained, progress=progress
         )
@@ -404,12 +412,27 @@ class ThermalNetwork(Network):
         parameters: Mapping[str, ArrayLike] | None = None,
         trained: Training | None = None,
     ) -> SteadyState:
-        """Temperatures and losses at rest; see :func:`models.simulation.steady_state.steady_state`."""
+        """Temperatures and losses at rest; see :func:`models.simulation.steady_state.steady_state`.
+
+        Raises
+        ------
+        InputError
+            Also if a parameter is outside its bounds.
+        """
+        self._refuse_outside_bounds(parameters or {})
         return steady_state(
             self, losses=losses, speed=speed, torque=torque, inputs=inputs, parameters=parameters, trained=trained
         )
 
     # ------------------------------------------------------------------ checks
+
+    def _refuse_outside_bounds(self, values: Mapping[str, ArrayLike]) -> None:
+        """Refuse what FMU and corrections refuse; a start outside its bounds widens them, as there."""
+        for parameter in self.parameters:
+            given = np.asarray(values.get(parameter.name, parameter.start), dtype=float)
+            low, high = min(parameter.lower, parameter.start), max(parameter.upper, parameter.start)
+            if not np.all((given >= low) & (given <= high)):
+                raise InputError(f"parameter {parameter.name!r} is {given}; {low:g} to {high:g} is possible")
 
     def _members(self, node: str) -> tuple[str, ...]:
         if node in self.groups:
