@@ -113,8 +113,8 @@ class Definition(Section):
         faults = [*_duplicate_names(self), *_unknown_names(self)]
         # What follows reads the tables by their names.
         faults = faults or [
-            *_load_shares(self), *_axial_loads(self), *_shafts_in_gears(self), *_seals_on_shafts(self),
-            *_gears_in_housing(self), *_oil_level(self), *_oil_volume(self),
+            *_load_shares(self), *_taper_pairs(self), *_axial_loads(self), *_shafts_in_gears(self),
+            *_seals_on_shafts(self), *_gears_in_housing(self), *_oil_level(self), *_oil_volume(self),
         ]  # fmt: skip
         if faults:
             raise ValueError("\n".join(faults))
@@ -171,6 +171,16 @@ def _load_shares(definition: Definition) -> Iterator[str]:
             yield f"bearing: none is on the shaft '{shaft.name}'"
         elif abs(sum(shares) - 1.0) > SHARE_TOLERANCE:
             yield f"bearing: load_share of the bearings on '{shaft.name}' sum to {sum(shares):g}, not to 1"
+
+
+def _taper_pairs(definition: Definition) -> Iterator[str]:
+    """Refuse taper bearings without a partner that they are adjusted against."""
+    for shaft in definition.shaft:
+        tapers = [b for b in definition.bearing if b.shaft == shaft.name and b.type == "tapered_roller"]
+        if len(tapers) not in (0, 2):
+            yield f"bearing: {len(tapers)} of those on '{shaft.name}' are taper bearings; they come in adjusted pairs"
+        elif tapers and any(b.locating and b not in tapers for b in definition.bearing if b.shaft == shaft.name):
+            yield f"bearing: on '{shaft.name}' a taper bearing takes the force along it; no other one is locating"
 
 
 def _axial_loads(definition: Definition) -> Iterator[str]:

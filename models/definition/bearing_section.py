@@ -20,8 +20,9 @@ LARGEST_RING_RATIO = 5.0  # outside diameter over bore; the largest of ISO 15, f
 OF_TYPE: dict[str, dict[str, float]] = {
     "cylindrical_roller": {"K_Z": 5.1, "K_L": 0.65, "mu_EHL": 0.02},
     "deep_groove_ball": {"K_Z": 3.1, "mu_EHL": 0.05},
+    "tapered_roller": {"K_Z": 6.0, "K_L": 0.7, "mu_EHL": 0.002},
 }
-SLIDING_OF_TYPE = {"cylindrical_roller": "S2", "deep_groove_ball": "S1"}
+SLIDING_OF_TYPE = {"cylindrical_roller": "S2", "deep_groove_ball": "S1", "tapered_roller": "S1"}
 FLANGE_SLIDING = 0.16
 NO_FLANGE = re.compile(r"\s*NU?\s*\d")  # N and NU let the shaft move
 
@@ -32,7 +33,7 @@ class Bearing(Section):
     name: Name
     shaft: Name
     designation: Text
-    type: Literal["cylindrical_roller", "deep_groove_ball"]
+    type: Literal["cylindrical_roller", "deep_groove_ball", "tapered_roller"]
     bore_mm: Annotated[float, between(1.0, 1000.0)]
     outside_diameter_mm: Annotated[float, between(3.0, 2000.0)]
     width_mm: Annotated[float, between(1.0, 500.0)]
@@ -51,6 +52,7 @@ class Bearing(Section):
     load_share: Annotated[float, between(0.0, 1.0)]
     locating: bool | None = None  # none, not false, so that files without helical gears keep their hash
     static_load_kN: Annotated[float, between(0.1, 1e4)] | None = None
+    Y: Annotated[float, between(0.3, 5.0)] | None = None
     drag: Literal["2016", "2008"] = "2016"
     heat_dissipation_W_K: Annotated[float, between(0.001, 1000.0)] | None = None
 
@@ -81,7 +83,7 @@ class Bearing(Section):
     def axial_fault(self) -> str | None:
         """Reason why it cannot take the axial force of helical gears; None if it can."""
         if self.type == "cylindrical_roller" and NO_FLANGE.match(self.designation):
-            return f"{self.designation} lets the shaft move: an NJ, an NUP or a deep groove ball bearing can locate it"
+            return f"{self.designation} lets the shaft move: an NJ, an NUP, a ball or a taper bearing can locate it"
         if self.type == "deep_groove_ball" and (self.S2 is None or self.static_load_kN is None):
             return "S2 of its series (SKF) and static_load_kN, the rating C0 of the catalogue, are needed"
         return (
@@ -90,7 +92,7 @@ class Bearing(Section):
 
     @property
     def sliding_constant(self) -> float:
-        """S1 of a ball bearing, S2 of a roller bearing, [-]."""
+        """S2 of a cylindrical roller bearing, S1 of the others, [-]."""
         return float(getattr(self, SLIDING_OF_TYPE[self.type]))
 
     @model_validator(mode="before")
@@ -105,6 +107,10 @@ class Bearing(Section):
             raise ValueError(f"{key} is missing, by which SKF's model calculates the sliding of a {self.type}")
         if self.K_L is not None and "K_L" not in OF_TYPE[self.type]:
             raise ValueError(f"K_L is given, which a {self.type} does not have in SKF's model; leave it out")
+        if self.type == "tapered_roller" and (self.Y is None or self.load_share == 0.0):
+            raise ValueError(
+                "a tapered_roller bearing needs Y, its axial load factor (catalogue), and a load_share above 0"
+            )
         return self
 
     @model_validator(mode="after")

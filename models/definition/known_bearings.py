@@ -13,10 +13,10 @@ from models.files.toml_file import packaged, parse, read_text
 FOLDER, FILE = "bearings", "known"
 # Suffixes of cage and design do not count; the friction of a seal in the bearing (RS) is not modelled.
 # Under a radial load N, NJ and NUP have the constants of NU.
-DESIGNATION = re.compile(r"\s*(N|NJ|NU|NUP)?\s*(\d{3,4})(?!\d)(?!.*RS)")
+DESIGNATION = re.compile(r"\s*(N|NJ|NU|NUP)?\s*(\d{3,5})(?!\d)(?!.*RS)")
 SIZES = ("bore_mm", "outside_diameter_mm", "width_mm", "mass_kg")
-RATING = "static_load_kN"  # of balls
-FILLED = (*SIZES, RATING, "R1", "S1", "S2", "type", "model")  # what a designation gives
+FIFTH = {"deep_groove_ball": ("static_load_kN",), "tapered_roller": ("Y",)}  # what the table has next to the sizes
+FILLED = (*SIZES, "static_load_kN", "Y", "R1", "S1", "S2", "type", "model")  # what a designation gives
 UNCERTAIN, SD_SHARE = ("mass_kg", "R1", "S1", "S2"), 0.1  # the constants are those of a series, rounded
 
 
@@ -27,7 +27,8 @@ def _catalogue() -> dict[str, tuple[dict[str, Any], str, str]]:
     for series in parse(read_text(packaged(FOLDER, FILE)), file=f"{FILE}.toml")["series"]:
         of_all = {key: series[key] for key in ("type", "R1", "S1", "S2") if key in series} | {"model": "skf"}
         for name, sizes in series["sizes"].items():
-            values = dict(zip((*SIZES, RATING), map(float, sizes), strict=False))  # rollers end before the rating
+            keys = (*SIZES, *FIFTH.get(series["type"], ()))
+            values = dict(zip(keys, map(float, sizes), strict=True))
             found[name] = values | of_all, series["name"], series["source"]
     return found
 
@@ -86,7 +87,9 @@ def filled_by_designation(own: dict[str, Any], notes: Annotations, path: str) ->
         filled = {key: value for key, value in values.items() if key not in own}
         for key in filled:
             of_key = (
-                of_mass if key in ("mass_kg", RATING) else f"{name}, ISO 15 and SKF friction model, series {series}"
+                of_mass
+                if key in ("mass_kg", "static_load_kN", "Y")
+                else f"{name}, ISO 15 and SKF friction model, series {series}"
             )
             notes.sources[f"{path}.{key}"] = f"typical: {of_key}"
             if key in UNCERTAIN:
@@ -94,12 +97,13 @@ def filled_by_designation(own: dict[str, Any], notes: Annotations, path: str) ->
         return own | filled
     missing = [key for key in (*SIZES, "R1", "type") if key not in own]
     if not {*SLIDING_OF_TYPE.values()} & {*own}:
-        missing.append(SLIDING_OF_TYPE.get(str(own.get("type")), "S1 (balls) or S2 (rollers)"))
+        missing.append(SLIDING_OF_TYPE.get(str(own.get("type")), "S1 (balls, tapers) or S2 (rollers)"))
     if missing and isinstance(named, str):
         text = (
             f"sizes of {named!r} are not known; give {', '.join(missing)} (known are cylindrical roller bearings as "
-            "NU 207 and deep groove ball bearings as 6208, open: python -m builder check --known). Bearings of other "
-            f"types than {' and '.join(OF_TYPE)} are not supported: describe their machine without geometry, as "
+            "NU 207, taper roller bearings as 30208 and deep groove ball bearings as 6208, open: "
+            "python -m builder check --known). Bearings of other "
+            f"types than {', '.join(OF_TYPE)} are not supported: describe their machine without geometry, as "
             "python -m builder new FILE --like reducer does"
         )
         notes.faults.append((f"{path}.designation", text))

@@ -5,7 +5,7 @@ The catalogue's units are kept inside: mm, N, 1/min, mm^2/s, N mm.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -13,6 +13,7 @@ import numpy as np
 
 from models.base.root_finding import decreasing_root
 from models.base.types import Array, Numeric
+from models.definition.bearing_section import Bearing
 from models.formulas.heat_transfer import GRAVITY
 from models.formulas.oil import Oil
 from models.losses.loss_term import OIL, SPEED, TORQUE, GearboxData, LossKind, LossTerm, TermInput
@@ -38,8 +39,10 @@ STARVATION_NU = 500.0  # mm^2/s, up to which thicker oil is taken to starve the 
 OIL_FLOW_HEAT = 27.0  # W/K per l/min, SKF; rho c_p of a mineral oil at 60 degC gives 28.5
 TEMPERATURE_TOL = 5e-3  # K
 # Exponents of d_m and F_r in the rolling and in the sliding variable, without an axial load (SKF 2016, table 2).
-EXPONENTS = {"cylindrical_roller": ((2.41, 0.31), (1.0, 1.0)), "deep_groove_ball": ((1.96, 0.54), (-0.26, 5.0 / 3.0))}
+EXPONENTS = {"cylindrical_roller": ((2.41, 0.31), (1.0, 1.0)), "deep_groove_ball": ((1.96, 0.54), (-0.26, 5.0 / 3.0)),
+             "tapered_roller": ((2.38, 0.31), (0.82, 1.0))}  # fmt: skip
 AXIAL_ROLLING = 1.7  # R2 of single row deep groove ball bearings (SKF 2016, table 2a)
+AXIAL_TAPERS = (10.9, 2.0)  # R2 and S2 of taper roller bearings, for Y F_a
 
 
 def oil_flow_max(D_mm: float, B_mm: float) -> float:
@@ -86,7 +89,7 @@ class SkfBearing:
 
     Attributes
     ----------
-    type : {"cylindrical_roller", "deep_groove_ball"}
+    type : {"cylindrical_roller", "deep_groove_ball", "tapered_roller"}
     d, D, B : float
         Bore, outside diameter, width, [mm]
     H : float
@@ -96,9 +99,9 @@ class SkfBearing:
     R1, S : float
         Geometry constants of the series, [-]: of rolling, and of sliding under a radial load (S2 of rollers, S1 of
         balls)
-    axial, S_axial, C_0 : float
-        Axial over radial load [-], constant of its sliding [-] (S1 of rollers, S2 of balls), and static load rating of
-        balls [N]
+    axial, S_axial, C_0, Y : float
+        Axial over radial load [-], constant of its sliding [-] (S1 of rollers, S2 of balls), static load rating of
+        balls [N], axial load factor of tapers [-]
     K_rs, K_Z : float
         Replenishment and bearing constants, [-]
     K_L : float
@@ -115,7 +118,7 @@ class SkfBearing:
         Ambient temperature for eq. (8), [degC]: the definition's, also where a cycle gives another
     """
 
-    type: Literal["cylindrical_roller", "deep_groove_ball"]
+    type: Literal["cylindrical_roller", "deep_groove_ball", "tapered_roller"]
     d: float
     D: float
     B: float
@@ -131,6 +134,7 @@ class SkfBearing:
     axial: float = 0.0
     S_axial: float = 0.0
     C_0: float = 0.0
+    Y: float = 0.0
     drag: Literal["2016", "2008"] = "2016"
     temperature: Literal["mean", "skf_outlet"] = "mean"
     W_s: float = 0.0
@@ -198,7 +202,10 @@ class SkfBearing:
         d_m, F_a = self.d_m, self.axial * F_r
         of_rolling, of_sliding = EXPONENTS[self.type]
         rolling, sliding = F_r, self.S * d_m ** of_sliding[0] * F_r ** of_sliding[1]
-        if self.axial > 0.0 and self.type == "cylindrical_roller":
+        if self.type == "tapered_roller":
+            rolling, push = F_r + AXIAL_TAPERS[0] * self.Y * F_a, F_r + AXIAL_TAPERS[1] * self.Y * F_a
+            sliding = self.S * d_m ** of_sliding[0] * push ** of_sliding[1]
+        elif self.axial > 0.0 and self.type == "cylindrical_roller":
             sliding = sliding + self.S_axial * d_m**0.9 * F_a
         elif self.axial > 0.0:
             sine = np.sin(np.radians(24.6 * (F_a / self.C_0) ** 0.24))
@@ -280,11 +287,30 @@ class BearingLaw:
         return loss[:, None]
 
 
+def _axial_share(table: Bearing, bearings: Sequence[Bearing], tilt: float) -> float:
+    r"""Axial load of a bearing over the transverse tooth force, [-].
+
+    Under a radial load a taper bearing pushes its partner with :math:`F_r / 2Y`. Of a pair without preload each carries
+    its own push, or that of the other one with what the gear adds to it or takes from it, whichever is more.
+
+    References
+    ----------
+    SKF "Rolling bearings", 2016, section on taper roller bearings; from memory, its six cases in one formula.
+    """
+    push = tilt if table.locating else 0.0
+    if table.type != "tapered_roller":
+        return push
+    other = next(b for b in bearings if b.shaft == table.shaft and b.type == table.type and b.name != table.name)
+    own, from_other = (0.5 * one.load_share / float(one.Y or 1.0) for one in (table, other))
+    return max(own, from_other + push - (tilt if other.locating else 0.0))
+
+
 def bearing_terms(gearbox: GearboxData) -> Iterator[LossTerm]:
     """Yield the loss of every ``[[bearing]]``: its share of the transverse tooth force is its radial load.
 
-    The locating bearing of a shaft takes the whole axial force of helical gears, ``F_bt tan(beta_b)``. The couple that
-    this force makes at the pitch circle loads one bearing more and the other less; it is left out.
+    The locating bearing of a shaft takes the whole axial force of helical gears, ``F_bt tan(beta_b)``; two taper
+    bearings share it with what they push each other. The couple that this force makes at the pitch circle loads one
+    bearing more and the other less; it is left out.
     """
     oil, pair = gearbox.lubricant(), gearbox.stage[0].pair()
     r_b, tilt = pair.r_b[0], float(np.tan(pair.beta_b))
@@ -302,9 +328,10 @@ def bearing_terms(gearbox: GearboxData) -> Iterator[LossTerm]:
             mass=table.mass_kg,
             R1=table.R1,
             S=table.sliding_constant,
-            axial=tilt / table.load_share if table.locating and tilt > 0.0 else 0.0,
+            axial=_axial_share(table, gearbox.bearing, tilt) / (table.load_share or 1.0),
             S_axial=S_axial,
             C_0=C_0,
+            Y=table.Y or 0.0,
             K_rs=table.K_rs,
             K_Z=table.K_Z,
             K_L=table.K_L or 0.0,

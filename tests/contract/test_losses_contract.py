@@ -32,6 +32,7 @@ HELICAL: dict[str, Any] = {
     "stage.0.helix_angle_deg": 2.0,
     **{f"bearing.{i}.{key}": value for i in (0, 2) for key, value in (("designation", "NJ 406"), ("locating", True))},
 }
+TAPERS: dict[str, Any] = {f"bearing.{i}.designation": "30206" for i in EVERY_BEARING}
 BALLS: dict[str, Any] = {f"bearing.{i}.designation": "6406" for i in EVERY_BEARING}
 WRITTEN_OUT = "of_the_law"  # the rig's file names the roughness that this is
 # Every choice that a definition offers and the rig's file does not make.
@@ -40,6 +41,7 @@ OPTIONS: dict[str, Mapping[str, Any]] = {
     **{name: {} for name in OTHERS},
     "roelands": {"oil.pressure_viscosity": "roelands"},
     "ball bearings": BALLS,  # another type has other constants
+    "taper bearings": TAPERS,
     **{
         f"{section.__name__}.{key} {choice}": {f"{place}.{key}": choice for place in places}
         for section, places in PLACES.items()
@@ -201,6 +203,7 @@ OPTIONAL: list[Mapping[str, Any]] = [
     HELICAL | {"bearing.0.S1": 0.2},
     HELICAL | {"bearing.1.designation": "NJ 406", "bearing.0.locating": False, "bearing.1.locating": True},
     HELICAL | BALLS | {"bearing.2.S2": 100.0},
+    HELICAL | TAPERS | {"bearing.2.Y": 1.7},
     HELICAL | BALLS | {"bearing.2.static_load_kN": 20.0},
     {"shaft.0.heat_capacity_J_K": 400.0},
     {"shaft.0.surface_to_air": True},

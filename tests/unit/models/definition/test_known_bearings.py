@@ -56,8 +56,11 @@ def test_an_unknown_designation_is_one_fault_that_says_what_to_give(tmp_path: Pa
     lines = str(caught.value).splitlines()
     assert len(lines) == 4  # one per bearing, and no line for every key that follows from it
     assert "bearing 'bearing_1'.designation: sizes of 'NU 999' are not known; give bore_mm" in lines[0]
-    assert "type, S1 (balls) or S2 (rollers) (known are" in lines[0]
-    assert "Bearings of other types than cylindrical_roller and deep_groove_ball are not supported" in lines[0]
+    assert "type, S1 (balls, tapers) or S2 (rollers) (known are" in lines[0]
+    assert (
+        "Bearings of other types than cylindrical_roller, deep_groove_ball, tapered_roller are not supported"
+        in lines[0]
+    )
 
 
 @pytest.mark.parametrize(
@@ -104,7 +107,15 @@ HELICAL = {"stage.0.helix_angle_deg": 2.0, "bearing.0.locating": True, "bearing.
     [
         ({"bearing.0.locating": False}, "bearing: none of those on 'shaft_1' is locating; gears of helix_angle_deg"),
         ({"bearing.1.locating": True}, "bearing: 2 of those on 'shaft_1' are locating"),
-        ({}, "bearing 'bearing_1'.locating: NU 406 lets the shaft move: an NJ, an NUP or a deep groove ball bearing"),
+        ({}, "bearing 'bearing_1'.locating: NU 406 lets the shaft move: an NJ, an NUP, a ball or a taper bearing"),
+        (
+            {"bearing.1.designation": "30206", "bearing.0.designation": "NJ 406"},
+            "bearing: 1 of those on 'shaft_1' are taper bearings; they come in adjusted pairs",
+        ),
+        (
+            {"bearing.0.type": "tapered_roller", "bearing.0.S1": 0.017},
+            "bearing 'bearing_1': a tapered_roller bearing needs Y",
+        ),
         (
             {"bearing.0.type": "deep_groove_ball", "bearing.0.S1": 0.003, "bearing.0.K_L": None, "bearing.0.S2": None},
             "bearing 'bearing_1'.locating: S2 of its series (SKF) and static_load_kN",
@@ -121,6 +132,6 @@ def test_bearings_that_cannot_take_what_helical_gears_push(changes: dict[str, ob
 
 
 def test_bearings_that_can(fzg: Gearbox) -> None:
-    for name in ("NJ 406", "NUP 406 ECP", "6406"):
-        helical = fzg.with_values(HELICAL | {f"bearing.{i}.designation": name for i in (0, 2)})
+    for name in ("NJ 406", "NUP 406 ECP", "6406", "30206"):
+        helical = fzg.with_values(HELICAL | {f"bearing.{i}.designation": name for i in range(4)})
         assert [bearing.axial_fault() for bearing in helical.bearing if bearing.locating] == [None, None]

@@ -140,16 +140,21 @@ ROLLERS = SkfBearing(type="cylindrical_roller", d=50, D=90, B=23, H=0, mass=0.56
                      K_Z=5.1, K_L=0.65, mu_bl=0.12, mu_EHL=0.02, axial=1000.0 / 6000.0, S_axial=0.16)  # fmt: skip
 
 
+TAPERS = SkfBearing(type="tapered_roller", d=40, D=68, B=19, H=0, mass=0.27, R1=2.38e-6, S=0.014, K_rs=3e-8, K_Z=6.0,
+                    K_L=0.7, mu_bl=0.12, mu_EHL=0.002, axial=0.5, Y=1.6)  # fmt: skip
+
+
 @pytest.mark.parametrize(
-    ("bearing", "F_r", "M_rr", "M_sl"), [(BALLS, 1500.0, 80.303, 21.370), (ROLLERS, 6000.0, 340.0, 160.25)]
+    ("bearing", "F_r", "M_rr", "M_sl"),
+    [(BALLS, 1500.0, 80.303, 21.370), (ROLLERS, 6000.0, 340.0, 160.25), (TAPERS, 4000.0, 495.75, 10.644)],
 )
 def test_worked_cases_with_an_axial_load(bearing: SkfBearing, F_r: float, M_rr: float, M_sl: float) -> None:
-    """A 6208 with 500 N along the shaft and an NJ 2210 with 1000 N, at 1500 1/min and 32 mm2/s."""
+    """A 6208 with 500 N along the shaft, an NJ 2210 with 1000 N, a 32008 X with 2000 N; 1500 1/min, 32 mm2/s."""
     found = bearing.friction_moments(n_rpm=1500.0, F_r=F_r, nu=32.0)
     assert [float(moment) for moment in found[:2]] == pytest.approx([M_rr, M_sl], rel=1e-4)
 
 
-@pytest.mark.parametrize("bearing", [BALLS, ROLLERS])
+@pytest.mark.parametrize("bearing", [BALLS, ROLLERS, TAPERS])
 def test_an_axial_load_costs_friction(bearing: SkfBearing) -> None:
     free, loaded = (
         [float(m) for m in replace(bearing, axial=axial).friction_moments(n_rpm=1500.0, F_r=2000.0, nu=32.0)]
@@ -170,3 +175,27 @@ def test_the_locating_bearing_takes_the_axial_force() -> None:
     assert axial["input_far_side"] == axial["output_far_side"] == pytest.approx(of_reference, rel=1e-12)
     spur = GEARBOX.with_values({"bearing.0.locating": True}).losses()
     assert spur.term("bearing_1").law.bearing.axial == 0.0
+
+
+def test_taper_bearings_push_each_other() -> None:
+    """SKF's cases: F_r / 2 Y each; the one that the gear pushes on carries the other's push and the gear's."""
+    tapers = {f"bearing.{i}.designation": name for i, name in enumerate(("30208", "30208", "30211", "30211"))}
+    helical = load_gearbox("helical").with_values(tapers)
+    tilt = np.tan(helical.stage[0].pair().beta_b)
+    axial = {term.name: term.law.bearing.axial * 0.5 for term in helical.losses().terms if term.kind.name == "bearing"}
+    assert axial == {
+        "input_motor_side": pytest.approx(0.25 / 1.6), "input_far_side": pytest.approx(0.25 / 1.6 + tilt),
+        "output_far_side": pytest.approx(0.25 / 1.5 + tilt), "output_pump_side": pytest.approx(0.25 / 1.5),
+    }  # fmt: skip
+    # Without a helix angle the one with the larger push loads both.
+    changes: dict[str, str | float] = {f"bearing.{i}.designation": "32006" for i in range(4)}
+    spur = GEARBOX.with_values(changes | {"bearing.0.load_share": 0.7, "bearing.1.load_share": 0.3}).losses()
+    loads = [spur.term(f"bearing_{i}").law.bearing.axial * share for i, share in ((1, 0.7), (2, 0.3))]
+    assert loads == pytest.approx([0.35 / 1.4, 0.35 / 1.4])
+    # A gear that pulls less than what the other one pushes leaves its own push to the one that it pulls away from.
+    pulled = helical.with_values({"bearing.0.load_share": 0.9, "bearing.1.load_share": 0.1}).losses()
+    far, near = (
+        pulled.term(name).law.bearing.axial * share
+        for name, share in (("input_far_side", 0.1), ("input_motor_side", 0.9))
+    )
+    assert (far, near) == pytest.approx((0.45 / 1.6 + tilt, 0.45 / 1.6))
