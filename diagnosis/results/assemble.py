@@ -50,7 +50,7 @@ BADLY = 2.0  # times the size that matters, which a calibrated model may be off 
 ENOUGH_VISIBLE = 0.1  # of the effects that were asked for, for a "consistent" that means something
 MOST_RANKED = 500
 PROBABLY = 0.5
-LEFT_OUT = "; a second effect, without a name, was fitted too and is left out: the held-out recordings contradict it"
+LEFT_OUT = "; a second effect was fitted too and is left out: the held-out recordings contradict it"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -60,7 +60,7 @@ class Validated:
     model : PredictingModel
         With `best`, but where that makes held-out temperatures worse
     without_second : bool
-        True if a second effect, without a name, was left out because it does the harm
+        True if a second effect was left out because it does the harm
     refuted : Refuted or None
         What would have been detected without the held-out recordings
     """
@@ -111,6 +111,13 @@ def validate(
     if single is not None and not (alone := model_with(single)).contradicted:  # what has no name does the harm
         model, answers = alone, [replace(answer, best=single) for answer in answers]
         much, without_second = posterior.leaves_much(single), True
+    if model.contradicted and model.best is not None and len(model.best.effects) == 2:
+        # A second effect that the held-out recordings contradict takes nothing back from the first one.
+        singles = replace(posterior, judged=tuple(one for one in posterior.judged if len(one.effects) == 1))
+        first = model_with(_best(singles, decide(singles)))
+        if first.predicted.holdout_gain > model.predicted.holdout_gain:
+            posterior, answers, model, without_second = singles, decide(singles), first, True
+            much = first.best is not None and posterior.leaves_much(first.best)
     both = posterior.log_e + model.predicted.holdout_gain
     if model.best is not None and posterior.detected and both < posterior.threshold and not faulty:
         names = " and ".join(named(effect.mechanism, effect.place) for effect in model.best.effects)
