@@ -106,27 +106,22 @@ def validate(
         return PredictingModel(best=best, predicted=predicted, train=train, holdout=holdout,
                                contradicted=contradicted and not faulty)  # fmt: skip
 
-    model, much, without_second, refuted = model_with(_best(posterior, answers)), False, False, None
-    single = _named_alone(posterior, answers) if model.contradicted else None
-    if single is not None and not (alone := model_with(single)).contradicted:  # what has no name does the harm
-        model, answers = alone, [replace(answer, best=single) for answer in answers]
-        much, without_second = posterior.leaves_much(single), True
+    model, without_second, refuted = model_with(_best(posterior, answers)), False, None
     if model.contradicted and model.best is not None and len(model.best.effects) == 2:
         # A second effect that the held-out recordings contradict takes nothing back from the first one.
         singles = replace(posterior, judged=tuple(one for one in posterior.judged if len(one.effects) == 1))
         first = model_with(_best(singles, decide(singles)))
         if first.predicted.holdout_gain > model.predicted.holdout_gain:
-            posterior, answers, model, without_second = singles, decide(singles), first, True
-            much = first.best is not None and posterior.leaves_much(first.best)
+            posterior, answers, model, without_second = singles, decide(singles), first, not first.contradicted
     both = posterior.log_e + model.predicted.holdout_gain
     if model.best is not None and posterior.detected and both < posterior.threshold and not faulty:
         names = " and ".join(named(effect.mechanism, effect.place) for effect in model.best.effects)
         refuted = Refuted(names=names, log_e_value=posterior.log_e, log_score_gain=model.predicted.holdout_gain)
         posterior = replace(posterior, log_e=both)
-        answers, much, without_second = decide(posterior), False, False
+        answers, without_second = decide(posterior), False
         model = model_with(_best(posterior, answers))
     best, gain, contradicted = model.best, model.predicted.holdout_gain, model.contradicted and bool(answers)
-    if contradicted or much:
+    if contradicted:
         answers = [withdraw_claim(answer, posterior.rule) for answer in answers]
     if contradicted and model.holdout.after > model.holdout.calibrated:
         train, holdout, model = model.train, model.holdout, model_with(None)
@@ -151,15 +146,6 @@ def _best(posterior: Posterior, answers: Sequence[Answer]) -> Judged | None:
         return answers[0].best
     fitted = (one for one, _ in posterior.ranked if one.fit is not None and one.kind != "nothing")
     return next(fitted, None) if posterior.detected else None
-
-
-def _named_alone(posterior: Posterior, answers: Sequence[Answer]) -> Judged | None:
-    """The effect with a name without the one next to it, fitted; None if both have names, or there is one effect."""
-    if len(answers) != 1 or len(answers[0].best.effects) == 1:
-        return None
-    label = answers[0].effect.label
-    singles = (one for one in posterior.judged if len(one.effects) == 1 and one.fit is not None)
-    return next((one for one in singles if one.label == label), None)
 
 
 def _final(best: Judged | None, plain: Fit, faulty: Sequence[str]) -> Fit:

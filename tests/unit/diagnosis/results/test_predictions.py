@@ -82,15 +82,15 @@ def test_what_was_learnt_is_left_out_where_it_makes_the_recordings_worse(
 
 @pytest.mark.parametrize(
     ("left", "named", "alone_W", "stays"),
-    [(1.0, 1, 65.0, True), (80.0, 1, 65.0, True), (1.0, 2, 65.0, False), (1.0, 1, 900.0, False)],
+    [(1.0, 1, 65.0, True), (80.0, 1, 65.0, True), (1.0, 2, 65.0, True), (1.0, 1, 900.0, False)],
 )
-def test_an_effect_without_a_name_is_left_out_where_held_out_readings_contradict_it(
+def test_a_second_effect_is_left_out_where_held_out_readings_contradict_it(
     assembled: Assemble, prepared: Prepared, windage: Judged, monkeypatch: pytest.MonkeyPatch, left: float, named: int,
     alone_W: float, stays: bool,
 ) -> None:  # fmt: skip
-    """What has a name stays if it is not contradicted itself; as a claim if little is left without the other one.
+    """The first one stays if it is not contradicted itself, as a claim if little is left without the other one.
 
-    Two names stand or fall together.
+    Of two with names too.
     """
     there, z, at = windage.fitted.experiment, windage.fitted.z.copy(), len(prepared[2].z)
     z[at] = there.unknowns[at].z_of(alone_W)
@@ -109,4 +109,4 @@ def test_an_effect_without_a_name_is_left_out_where_held_out_readings_contradict
     assert stays or found.holdout.found > found.holdout.calibrated  # what it would have been with them
     assert found.findings[0].grade == ("claim" if stays and left == 1.0 else "likely")
     assert (found.holdout.after < found.holdout.calibrated) is stays
-    assert ("without a name, was fitted too and is left out" in str(found)) is stays
+    assert ("a second effect was fitted too and is left out" in str(found)) is stays
