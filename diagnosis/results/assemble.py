@@ -108,8 +108,9 @@ def assemble(
     unseen = _unseen(setup, posterior, findings)
     spoiled = spoiled_in(train, holdout, baselines=[r.name for r in setup.baseline],
                          least_K=settings.matters_K + setup.noise_K)  # fmt: skip
-    unfit = bool(spoiled) or train.calibrated - train.before > setup.noise_K
     badly = max(train.calibrated, holdout.calibrated) > BADLY * settings.matters_K + setup.noise_K
+    # Held-out recordings that contradict one explanation do not make a machine healthy that the model is far from.
+    unfit = bool(spoiled) or train.calibrated - train.before > setup.noise_K or (badly and valid.refuted is not None)
     verdict = verdict_of(posterior, [answer for answer, _ in reported], unseen, unfit=unfit, badly=badly)
     location = locations_of(setup, posterior) if posterior.detected or verdict in NO_CLAIM else ()
     inputs = setup.gearbox.network().inputs
@@ -240,7 +241,8 @@ def verdict_of(
     Parameters
     ----------
     unfit : bool
-        True if calibration made the model worse, of all or of some recordings: none was found that suits them
+        True if calibration made the model worse, of all or of some recordings, or left it far off where an effect was
+        detected that does not predict: no machine was found that suits them
     badly : bool
         True if the calibrated model is far off: silence means nothing then
     """

@@ -99,6 +99,13 @@ def _missing(d: Diagnosis) -> str:
     if d.log_e_value > d.threshold:
         back = f"; the held-out readings take {-d.holdout_gain:.1f} nat of it back" if d.holdout_gain <= -1.0 else ""
         return f"Yes{_in_what(d)}: {reached}{back}."
+    if _cannot_be_fitted(d) and not d.spoiled and d.train.calibrated <= d.train.before + d.noise_K:
+        off_K, what = _farthest(d)
+        return (
+            f"Yes: calibrated, the model is {off_K:.2f} K off what was {what}, and what explains the recordings learnt "
+            f"from does not predict the held-out ones ({reached}). Look first for a cooler, fan or heater with a "
+            "control of another kind, and for wrong columns, other units, and a wrong definition."
+        )
     if _cannot_be_fitted(d) and d.train.calibrated <= d.train.before:
         worse = ", ".join(f"{name} ({after:.2f} K, {before:.2f} K as delivered)"
                           for name, (before, after) in d.spoiled.items())  # fmt: skip

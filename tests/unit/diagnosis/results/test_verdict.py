@@ -10,7 +10,7 @@ from diagnosis.decision.posterior import Judged, Posterior
 from diagnosis.engine.learnt import error_classes, rule
 from diagnosis.results.assemble import verdict_of
 from diagnosis.results.first_screen import first_screen_of, verdict_text_of
-from diagnosis.results.result_parts import Errors, spoiled_in
+from diagnosis.results.result_parts import Errors, Refuted, spoiled_in
 from tests.unit.diagnosis.diagnosis_example import consistent
 
 
@@ -51,3 +51,16 @@ def test_recordings_that_do_not_fit_one_machine_are_named() -> None:
     (told,) = dict(first_screen_of(changed))["Is something missing?"]
     assert "further from after (2.20 K, 1.00 K as delivered), held (2.00 K, 1.00 K as delivered), closer" in told
     assert "They do not fit one machine" in told
+
+
+def test_what_no_explanation_predicts_is_not_healthy() -> None:
+    """A fan that switches by speed, which no catalogue has: 987 nat, taken back by the held-out recording."""
+    base = consistent()
+    taken_back = replace(
+        base, verdict="unexplained", log_e_value=-10955.5, threshold=40.0, spoiled={},
+        train=replace(base.train, before=5.24, calibrated=4.47), holdout=replace(base.holdout, calibrated=4.54),
+        refuted=Refuted(names="cooler_shaft_driven at oil", log_e_value=987.2, log_score_gain=-11942.7),
+    )  # fmt: skip
+    told, back = dict(first_screen_of(taken_back))["Is something missing?"]
+    assert told.startswith("Yes: calibrated, the model is 4.54 K off what was held out, and what explains the")
+    assert "control of another kind" in told and "What was learnt from supports cooler_shaft_driven" in back
