@@ -136,6 +136,10 @@ def test_held_out_readings_count_against_what_was_learnt_from(
     _, back = dict(found.first_screen)["Is something missing?"]
     assert f"supports windage at oil ({posterior.log_e:.1f} nat)" in back
     assert f"less probable, by {spare + 1.0:.0f} nat; both count." in back
+    # The same machine, where much smaller differences matter: it is far off then, and not healthy.
+    far = replace(posterior, settings=replace(posterior.settings, matters_K=0.01))
+    assert max(found.train.calibrated, found.holdout.calibrated) > 0.02 + found.noise_K
+    assert assembled(far, [claim]).verdict == "unexplained"
 
 
 def test_held_out_readings_are_judged_in_the_draughts_of_the_machine(
