@@ -19,6 +19,7 @@ from models.correction.correction import Correction, read_correction
 if TYPE_CHECKING:
     from diagnosis.decision.settings import Settings
     from diagnosis.recordings.recording import Recording
+    from diagnosis.results.result import Diagnosis
     from models.assembly.gearbox import Gearbox
     from models.mechanisms import Mechanism
 
@@ -155,6 +156,7 @@ def diagnose(
     for path in old:
         path.unlink(missing_ok=True)
     console.out.print("\n".join(found.summary()))
+    _print_own_notes(found, (*train, *held, *healthy))
     console.out.print()
     for name in written:
         console.out.print(f"wrote {output / name}")
@@ -162,11 +164,23 @@ def diagnose(
 
 def _print_notes(recordings: Sequence[Recording]) -> None:
     """Print the first notes on cleaned, assumed or unused data; the report has all of them."""
-    notes = [f"{recording.name}: {note}" for recording in recordings for note in recording.notes]
+    names: dict[str, list[str]] = {}
+    for recording in recordings:
+        for note in recording.notes:
+            names.setdefault(note, []).append(recording.name)
+    notes = [f"{', '.join(of)}: {note}" for note, of in names.items()]
     for note in notes[:MOST_NOTES]:
         console.err.print(f"note: {note}")
     if len(notes) > MOST_NOTES:
         console.err.print(f"and {len(notes) - MOST_NOTES} more: the report lists all notes")
+
+
+def _print_own_notes(found: Diagnosis, recordings: Sequence[Recording]) -> None:
+    """Print the notes of a diagnosis that are not about its recordings."""
+    known = {f"{recording.name}: {note}" for recording in recordings for note in recording.notes}
+    for note in found.notes:
+        if note not in known:
+            console.out.print(f"Note: {note}")
 
 
 def _check_options(recordings: tuple[str, ...], others: tuple[str, ...], dask: str | None, *, fleet: bool) -> None:
