@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -171,3 +173,17 @@ def test_what_is_known_reaches_the_diagnosis(fzg: Gearbox, tmp_path: Path, monke
         ])  # fmt: skip
         assert "no further" in str(done.exception), done.output
     assert given == [known, known]
+
+
+def test_notes_on_recordings_are_printed_once_and_own_notes_after(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    command = import_module("builder.commands.diagnose")
+    recordings = [SimpleNamespace(name=name, notes=("no air_speed_m_s", f"cleaned {name}")) for name in ("a", "b")]
+    command._print_notes(recordings)
+    assert capsys.readouterr().err.splitlines() == [
+        "note: a, b: no air_speed_m_s", "note: a: cleaned a", "note: b: cleaned b",
+    ]  # fmt: skip
+    found = SimpleNamespace(notes=("in the corrected model loss_gain = 0.5 is at its limit", "a: cleaned a"))
+    command._print_own_notes(found, recordings)
+    assert capsys.readouterr().out.splitlines() == ["Note: in the corrected model loss_gain = 0.5 is at its limit"]
