@@ -110,9 +110,10 @@ def validate(
     if model.contradicted and model.best is not None and len(model.best.effects) == 2:
         # A second effect that the held-out recordings contradict takes nothing back from the first one.
         singles = replace(posterior, judged=tuple(one for one in posterior.judged if len(one.effects) == 1))
-        first = model_with(_best(singles, decide(singles)))
+        alone = decide(singles)
+        first = model_with(_best(singles, alone))
         if first.predicted.holdout_gain > model.predicted.holdout_gain:
-            posterior, answers, model, without_second = singles, decide(singles), first, not first.contradicted
+            posterior, answers, model, without_second = singles, alone, first, not first.contradicted
     both = posterior.log_e + model.predicted.holdout_gain
     if model.best is not None and posterior.detected and both < posterior.threshold and not faulty:
         names = " and ".join(named(effect.mechanism, effect.place) for effect in model.best.effects)

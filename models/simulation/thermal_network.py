@@ -428,8 +428,8 @@ class ThermalNetwork(Network):
 
     def _refuse_outside_bounds(self, values: Mapping[str, ArrayLike]) -> None:
         """Refuse what FMU and corrections refuse; a start outside its bounds widens them, as there."""
-        for parameter in self.parameters:
-            given = np.asarray(values.get(parameter.name, parameter.start), dtype=float)
+        for parameter in (one for one in self.parameters if one.name in values):
+            given = np.asarray(values[parameter.name], dtype=float)
             low, high = min(parameter.lower, parameter.start), max(parameter.upper, parameter.start)
             if not np.all((given >= low) & (given <= high)):
                 raise InputError(f"parameter {parameter.name!r} is {given}; {low:g} to {high:g} is possible")

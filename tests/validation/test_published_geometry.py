@@ -56,7 +56,7 @@ def test_gearpie_helical(
 ) -> None:  # fmt: skip
     """Helix angle 15 degrees; base pitches of H701 are an independent calculation.
 
-    GEARpie sums a uniform load over slices; its own steps leave 0.3 %.
+    GEARpie sums a uniform load over slices; its own steps leave 0.25 %.
     """
     pair = gear_pair(alpha_n=math.radians(20.0), beta=math.radians(15.0), a=91.5e-3, **HELICAL[name])  # type: ignore[arg-type]
     assert [1e3 * radius for radius in pair.r_a] == pytest.approx(r_a, abs=6e-4)
@@ -66,7 +66,7 @@ def test_gearpie_helical(
     assert (pair.epsilon_alpha, pair.epsilon_beta) == pytest.approx(epsilon, abs=5e-3)
     assert pytest.approx(H_V, abs=5e-5) == pair.H_V
     uniform = load_sharing_loss_factor(pair, contact_points(pair, model="equal"))
-    assert uniform == pytest.approx(H_uniform, rel=3e-3)
+    assert uniform == pytest.approx(H_uniform, rel=2.5e-3)
 
 
 def test_tip_diameters_of_fzg_type_c() -> None:

@@ -188,14 +188,16 @@ def test_taper_bearings_push_each_other() -> None:
         "output_far_side": pytest.approx(0.25 / 1.5 + tilt), "output_pump_side": pytest.approx(0.25 / 1.5),
     }  # fmt: skip
     # Without a helix angle the one with the larger push loads both.
-    changes: dict[str, str | float] = {f"bearing.{i}.designation": "32006" for i in range(4)}
-    spur = GEARBOX.with_values(changes | {"bearing.0.load_share": 0.7, "bearing.1.load_share": 0.3}).losses()
+    spurs: dict[str, str | float] = {f"bearing.{i}.designation": "32006" for i in range(4)}
+    spur = GEARBOX.with_values(spurs | {"bearing.0.load_share": 0.7, "bearing.1.load_share": 0.3}).losses()
     loads = [spur.term(f"bearing_{i}").law.bearing.axial * share for i, share in ((1, 0.7), (2, 0.3))]
     assert loads == pytest.approx([0.35 / 1.4, 0.35 / 1.4])
-    # A gear that pulls less than what the other one pushes leaves its own push to the one that it pulls away from.
-    pulled = helical.with_values({"bearing.0.load_share": 0.9, "bearing.1.load_share": 0.1}).losses()
-    far, near = (
-        pulled.term(name).law.bearing.axial * share
-        for name, share in (("input_far_side", 0.1), ("input_motor_side", 0.9))
-    )
-    assert (far, near) == pytest.approx((0.45 / 1.6 + tilt, 0.45 / 1.6))
+    # The gear takes its force from the push of the locating bearing on the other one, if that push is large enough.
+    for share in (0.1, 0.9):
+        changes: dict[str, float] = {"bearing.0.load_share": 1.0 - share, "bearing.1.load_share": share}
+        turned = helical.with_values(changes).losses()
+        near = turned.term("input_motor_side").law.bearing.axial * (1.0 - share)
+        far = turned.term("input_far_side").law.bearing.axial * share
+        own = [0.5 * one / 1.6 for one in (1.0 - share, share)]
+        assert (near, far) == pytest.approx((max(own[0], own[1] - tilt), max(own[1], own[0] + tilt)))
+        assert (near > own[0]) is (share == 0.9)

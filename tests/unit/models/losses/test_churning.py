@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from functools import partial
+from typing import Any
+
 import numpy as np
 import pytest
 
 from models.assembly.gearbox import load_gearbox
 from models.base.errors import InputError
 from models.formulas.geometry import GearPair, gear_pair
-from models.losses.churning import ChurningLaw
+from models.losses.churning import ChurningLaw, churning_changenet_2011, churning_changenet_velex
 
 GEARBOX = load_gearbox("fzg").with_values({"oil.volume_l": 1.0})
 PAIR = GEARBOX.stage[0].pair()
@@ -83,3 +86,15 @@ def test_a_gear_under_oil_is_under_oil(model: str) -> None:
 def test_mauz_is_refused_for_wide_gears() -> None:
     with pytest.raises(InputError, match="cube of the face width and is refused beyond 60 mm; take 'changenet_2011'"):
         GEARBOX.with_values({"stage.0.churning.model": "mauz", "stage.0.face_width_mm": 61.0})
+
+
+def test_flanks_of_helical_teeth_are_longer() -> None:
+    """Of the wetted area they alone go with the helix angle: ``2 z H theta b / (pi cos(alpha_t) cos(beta))``."""
+    at: dict[str, Any] = {"h": 0.02, "r_p": 0.05, "b": 0.014, "z": 24, "alpha": 0.35, "V_oil": 1e-3}
+    at |= {"omega": 20.0, "nu": 15.41, "rho": 848.0}
+    for churning in (churning_changenet_velex, partial(churning_changenet_2011, module=4.5e-3)):
+        bare, spur, helical = (
+            float(churning(**at, tooth_height=height, beta=beta))
+            for height, beta in ((0.0, 0.0), (0.01, 0.0), (0.01, 0.5))
+        )
+        assert (helical - bare) / (spur - bare) == pytest.approx(1.0 / np.cos(0.5), rel=1e-9)

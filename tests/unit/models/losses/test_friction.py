@@ -162,3 +162,18 @@ def test_a_small_helix_angle_changes_no_loss() -> None:
     spur, found = LOSSES.breakdown(**at), GEARBOX.with_values(changes).losses().breakdown(**at)
     for name, loss in spur.items():
         assert np.asarray(found[name]) == pytest.approx(np.asarray(loss), rel=1e-2 if "bearing" in name else 2e-3)
+
+
+def test_heat_enters_helical_gears_along_their_lines_of_contact() -> None:
+    """Fast band source (Blok): the line is ``b / cos(beta_b)`` long and is crossed at ``omega T1C cos(beta_b)``."""
+    helical = load_gearbox("helical")
+    network, pair, steel = helical.network(), helical.stage[0].pair(), helical.stage[0].material
+    (link,) = (link for link in network.links if link.name == "mesh-pinion")
+    at = {"speed": 1500.0, "torque": 125.0, "striction": 1.0}
+    found = float(link.conductance.subs({s: at[s.name] for s in link.conductance.free_symbols}))
+    cosine, b, E_red = np.cos(pair.beta_b), pair.b, ehl.reduced_modulus(206e9, 0.3, 206e9, 0.3)
+    b_H, _ = ehl.hertz_line(125.0 / pair.r_b[0] / b, pair.rho_red_C, E_red)
+    chi = steel.conductivity_W_mK / (steel.density_kg_m3 * steel.specific_heat_J_kgK)
+    area, speed = 2.0 * b_H * b / cosine, 1500.0 * RPM * pair.T1C * cosine
+    expected = area * steel.conductivity_W_mK / 1.06 * np.sqrt(speed / (chi * b_H))
+    assert found == pytest.approx(float(expected), rel=1e-9)
