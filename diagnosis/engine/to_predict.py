@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 
 from diagnosis.engine.fit import NO_SOLUTION, NOISE_ALONE, Experiment, Fit, Guess, calibrate
 from diagnosis.engine.mean_loss import mean_loss, rests_on_the_definition
 from diagnosis.engine.set_apart import without_channels
-from diagnosis.engine.unknown import NetworkParameter, SensorBias, SensorLag, TermParameter, Unknown
+from diagnosis.engine.unknown import Held, NetworkParameter, TermParameter
 from diagnosis.forward.whitening import AS_ASSUMED, RandomHeat
 from models.base.types import Array
 from models.quantities.quantities import is_total_loss
-from models.terms.term import Term
 
 QUIET = RandomHeat(heat=0.1, wander=0.1)  # times the random heat that is assumed
 # By which temperatures have to come nearer before parameters may stand in for what the model lacks: with less random
@@ -27,14 +25,14 @@ LEAST_SHARE = 1e-6  # of the mean loss that an unknown changes per prior standar
 
 
 def calibrated_to_predict(plain: Fit, with_error: Fit, start: Array | None = None) -> Fit:
-    """The nominal machine calibrated by noise alone: the best of several calibrations.
+    """The nominal machine calibrated by noise alone, with instruments as estimated: the best of several calibrations.
 
     Parameters
     ----------
     plain : Fit
         A first calibration, with random heat as assumed
     with_error : Fit
-        The same machine calibrated with model error: another start, and the size of its losses
+        The same machine calibrated with model error: another start, the instruments, and the size of its losses
     start : Array, shape (unknowns,), or None
         Where the first calibration began; by default at the middles of the priors
 
@@ -44,47 +42,58 @@ def calibrated_to_predict(plain: Fit, with_error: Fit, start: Array | None = Non
         If there is no solution.
     """
     free = replace(plain.experiment, filters=None)
-    quiet = free.with_random_heat(QUIET)
-    return _best_of(free, {
-        LOSSES_K: _as_estimated(with_error, [free, quiet]),
-        NEARER_K: [plain, *_calibrations([(free, with_error.z)])],
-        0.0: _calibrations([(quiet, start)]),
-    })  # fmt: skip
-
-
-def _as_estimated(
-    with_error: Fit, experiments: Sequence[Experiment], guesses: Sequence[Guess] | None = None
-) -> Iterator[Fit]:
-    """Calibrations, each from the one before, with all losses as estimated with model error.
-
-    None if a loss is measured, or nothing in the definition fixes its size. Temperatures identify ratios of heats,
-    conductances and capacities: by noise alone their common size would stand in for what the model lacks.
-    """
-    if not rests_on_the_definition(with_error.experiment):
-        return
-    loss, slopes = mean_loss(with_error)
-    held = [
-        index for index, unknown in enumerate(with_error.experiment.unknowns)
-        if isinstance(unknown, NetworkParameter | TermParameter) and abs(slopes[index]) > LEAST_SHARE * loss
-    ]  # fmt: skip
-    z = with_error.z
-    for experiment in experiments:
-        with suppress(*NO_SOLUTION):
-            reached = calibrate(experiment, z, guesses, held)
-            z = reached.z
-            yield reached
+    first = np.zeros(len(plain.z)) if start is None else start
+    return _best_of(free, _calibrations(free, with_error, [plain.z, with_error.z], [first]))
 
 
 def _calibrations(
-    tried: Iterable[tuple[Experiment, Array | None]], guesses: Sequence[Guess] | None = None
-) -> Iterator[Fit]:
-    """Experiments calibrated from starts; those without a solution are left out."""
-    for experiment, start in tried:
+    free: Experiment, with_error: Fit, starts: Sequence[Array], quiet_starts: Sequence[Array],
+    guesses: Sequence[Guess] | None = None,
+) -> Mapping[float, Sequence[Fit]]:  # fmt: skip
+    """Calibrations in groups, by what the first ones may be farther off than the best, [K]; those without a solution
+    are left out.
+
+    Instruments stay as estimated with model error in all of them. By noise alone their gains, offsets and lags would
+    stand in for what the model lacks, and a machine that is right with the recorder's errors alone is wrong in an FMU.
+
+    In the first group losses stay as well, where none is measured but the definition fixes their size. Temperatures
+    identify ratios of heats, conductances and capacities: their common size would stand in for what the model lacks.
+    """
+    quiet, of_instruments, of_losses = free.with_random_heat(QUIET), _instruments(with_error.experiment), list[int]()
+    if rests_on_the_definition(with_error.experiment):
+        loss, slopes = mean_loss(with_error)
+        of_losses = [
+            index for index, unknown in enumerate(with_error.experiment.unknowns)
+            if isinstance(unknown, NetworkParameter | TermParameter) and abs(slopes[index]) > LEAST_SHARE * loss
+        ]  # fmt: skip
+
+    def calibrated(experiment: Experiment, start: Array, held: Sequence[int]) -> Iterator[Fit]:
+        z = start.copy()
+        z[held] = with_error.z[held]
         with suppress(*NO_SOLUTION):
-            yield calibrate(experiment, start, guesses)
+            yield calibrate(experiment, z, guesses, held)
+
+    as_estimated, both = list[Fit](), sorted({*of_instruments, *of_losses})
+    for experiment in (free, quiet) if of_losses else ():
+        as_estimated += calibrated(experiment, as_estimated[-1].z if as_estimated else with_error.z, both)
+    return {
+        LOSSES_K: as_estimated,
+        NEARER_K: [fit for start in starts for fit in calibrated(free, start, of_instruments)],
+        0.0: [fit for start in quiet_starts for fit in calibrated(quiet, start, of_instruments)],
+    }
 
 
-def _best_of(free: Experiment, groups: Mapping[float, Iterable[Fit]]) -> Fit:
+def _instruments(experiment: Experiment) -> list[int]:
+    """Places of the unknowns of sensors and of recorded inputs, which the machine itself has none of."""
+    of_machine = {term.label for term in experiment.machine.terms if not term.of_measurement}
+    return [
+        index for index, unknown in enumerate(experiment.unknowns)
+        if not isinstance(unknown, NetworkParameter | Held)
+        and not (isinstance(unknown, TermParameter) and unknown.label in of_machine)
+    ]  # fmt: skip
+
+
+def _best_of(free: Experiment, groups: Mapping[float, Sequence[Fit]]) -> Fit:
     """The most probable of some calibrations that predict well, judged by the noise that is assumed.
 
     The first group counts that comes as near to the temperatures as the best one, but for its allowance [K]. Random
@@ -120,11 +129,11 @@ def refit_to_predict(fit: Fit, plain: Fit, apart: Collection[str] = ()) -> Fit:
     Parameters
     ----------
     fit : Fit
-        With model error in its metric, and with random heats that go with it
+        With model error in its metric, and with random heats that go with it: instruments stay as they are there
     plain : Fit
         The nominal machine so calibrated: a second start of the search, because there may be several basins
     apart : collection of str
-        Channels that do not count; what describes their sensors stays as it is
+        Channels that do not count
 
     Raises
     ------
@@ -137,25 +146,6 @@ def refit_to_predict(fit: Fit, plain: Fit, apart: Collection[str] = ()) -> Fit:
     counting = without_channels(every, apart) if apart else every
     nominal = fit.z.copy()
     nominal[: len(plain.z)] = plain.z_in(every)
-    quiet = counting.with_random_heat(QUIET)
-    starts, near = (fit.z, nominal), fit.trajectories
-    found = _best_of(counting, {
-        LOSSES_K: _as_estimated(fit, [counting, quiet], near),
-        NEARER_K: _calibrations(product([counting], starts), near),
-        0.0: _calibrations(product([quiet], starts), near),
-    })  # fmt: skip
-    if not apart:
-        return found
-    terms = {term.label: term for term in every.machine.terms}
-    own = [_describes(unknown, terms, apart) for unknown in every.unknowns]
-    return every.fit(np.where(own, fit.z, found.z), found.trajectories, iterations=0)
-
-
-def _describes(unknown: Unknown, terms: Mapping[str, Term], channels: Collection[str]) -> bool:
-    """True if an unknown is about the sensors of some channels, and nothing else."""
-    if isinstance(unknown, SensorBias | SensorLag):
-        return unknown.channel in channels
-    if not isinstance(unknown, TermParameter):
-        return False
-    term = terms[unknown.label]
-    return term.kind == "sensor" and set(term.target) <= set(channels)
+    starts = [fit.z, nominal]
+    found = _best_of(counting, _calibrations(counting, fit, starts, starts, fit.trajectories))
+    return every.fit(found.z, found.trajectories, iterations=0) if apart else found

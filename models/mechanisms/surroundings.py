@@ -13,6 +13,7 @@ from models.mechanisms.forms import (
     period,
     plain,
     positive,
+    rises,
     share_between,
     strength,
     temperature,
@@ -22,6 +23,7 @@ from models.mechanisms.mechanism import Mechanism
 
 FAMILY = "surroundings"
 HOUR_S = 3600.0
+SWITCHES = 24.0  # sharpness of a switch: from a tenth below a speed to a tenth above it
 WETTED_S = 300.0  # after which a shower has wetted everything
 STANDSTILL_DAY = "leave it at standstill for a day with an ambient probe on each side"
 
@@ -93,6 +95,45 @@ fan_thermostat = Mechanism(
     separate_by={"cooler_thermostat": "measure oil and housing when it switches: with a fan the housing moves first"},
 )
 
+fan_on_shaft = Mechanism(
+    name="fan_on_shaft",
+    family=FAMILY,
+    kind="link",
+    places=("housing",),
+    other="air",
+    parameters=lambda scale: (
+        strength(0.7 * scale.conductance, "W/K", "additional conductance to the air at the reference speed"),
+        plain("exponent", 0.7, sd=0.25, lower=0.2, upper=1.5, grid=(0.5, 0.9)),
+    ),
+    law=lambda s: s.strength * s.n**s.exponent,
+    says="A fan on a shaft blows air over the housing: it cools with speed and not at standstill.",
+    reference="a fan's flow goes with its speed, h ~ v_air^0.64 by ISO/TR 14179-2",
+    experiment="compare a cool-down at standstill with one at speed without load, and measure the air at the housing",
+    separate_by={
+        "cooler_shaft_driven": "measure oil and housing after a change of speed: with a fan the housing moves first",
+        "shaft_ends_to_air": "measure the shafts: their ends would make them the cooler ones",
+    },
+)
+
+fan_speed_switch = Mechanism(
+    name="fan_speed_switch",
+    family=FAMILY,
+    kind="link",
+    places=("housing",),
+    other="air",
+    parameters=lambda scale: (
+        strength(0.7 * scale.conductance, "W/K", "additional conductance to the air"),
+        positive("switch", 0.6, sd=0.8, grid=(0.05, 0.3, 0.6, 0.9, 1.2)),
+    ),
+    law=lambda s: s.strength * rises(s.n, at=s.switch, power=SWITCHES),
+    says="A fan runs above a speed: with the drive, or switched by its control.",
+    reference="a fan doubles to triples the conductance to air; that it switches within a tenth of the speed is ours",
+    experiment="hold speeds below and above the suspected one at the same loss",
+    separate_by={
+        "fan_on_shaft": "hold two speeds above the suspected one: a fan on the shaft cools better at the higher"
+    },
+)
+
 ambient_drift = Mechanism(
     name="ambient_drift",
     family=FAMILY,
@@ -126,4 +167,4 @@ ambient_swing = Mechanism(
     experiment=STANDSTILL_DAY,
 )
 
-MECHANISMS = (solar_soak, rain_on_housing, fan_thermostat, ambient_drift, ambient_swing)
+MECHANISMS = (solar_soak, rain_on_housing, fan_thermostat, fan_on_shaft, fan_speed_switch, ambient_drift, ambient_swing)

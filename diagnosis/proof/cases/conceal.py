@@ -38,8 +38,8 @@ MINOR = ("windage", "shaft_ends_to_air", "oil_level_thermal", "pump_heat", "radi
 # At usual strength these cause a kelvin or more, so that they stand out among minor ones.
 DOMINANT = ("churning_swirl", "splash_starvation", "run_in_flanks", "gear_wear", "torque_decay", "aeration", "oil_jet",
             "air_cooling_change", "foundation_conduction", "cooler_thermostat", "cooler_proportional", "oil_tank",
-            "cooler_constant", "cooler_shaft_driven", "water_jacket", "fan_thermostat", "rain_on_housing", "solar_soak",
-            "bearing_preload", "bearing_damage")  # fmt: skip
+            "cooler_constant", "cooler_shaft_driven", "water_jacket", "fan_thermostat", "fan_on_shaft",
+            "fan_speed_switch", "rain_on_housing", "solar_soak", "bearing_preload", "bearing_damage")  # fmt: skip
 MINOR_STRENGTH = (0.15, 0.4)
 STRENGTH = (0.25, 2.0)  # drawn evenly in its logarithm
 LEAST_STRENGTH = {"double": 0.5, "messy": 0.8}  # of effects that must be found next to others

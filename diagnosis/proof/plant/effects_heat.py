@@ -204,6 +204,21 @@ def fan_thermostat(g: Grip) -> None:
         g.conduct(f"{part}-air", g.p["a"] * switch, place=part)
 
 
+def fan_on_shaft(g: Grip) -> None:
+    """A fan on the input shaft blows on the housing; from the second half of the speed its air is choked."""
+    for part in g.places:
+        g.conduct(f"{part}-air", g.p["a"] * np.tanh(1.4 * g.x) / np.tanh(1.4 * 0.415), place=part)
+
+
+def fan_speed_switch(g: Grip) -> None:
+    """A fan that the drive's control switches by speed, and that takes a minute to run up and down."""
+    switch = g.switched(g.x, g.p["x_on"], 0.9 * g.p["x_on"])
+    blown = g.remembered("blown", 0.0)
+    g.memory["blown"] = blown + (switch - blown) * (1.0 - np.exp(-10.0 / 20.0))
+    for part in g.places:
+        g.conduct(f"{part}-air", g.p["a"] * g.memory["blown"], place=part)
+
+
 def rain_on_housing(g: Grip) -> None:
     """Showers wet the housing: a heat path to rain a little colder than the air."""
     phase = np.mod(g.hours - g.p["at_h"], g.p["every_h"])
@@ -278,6 +293,10 @@ HEAT_EFFECTS = (
            family="surroundings", before=ambient_swing),
     Effect("fan_thermostat", "link_factor", all_parts, relative(0.6, T_on=(50.0, 65.0), band=(3.0, 8.0)),
            "housing to air (1 + a) above T_on, hysteresis", family="surroundings", after=fan_thermostat),
+    Effect("fan_on_shaft", "link_factor", all_parts, relative(0.6), "housing to air (1 + a tanh(1.4 x) / 0.524)",
+           family="surroundings", after=fan_on_shaft),
+    Effect("fan_speed_switch", "link_factor", all_parts, relative(0.6, x_on=(0.2, 0.5)),
+           "housing to air (1 + a) above x_on, off below 0.9 x_on", family="surroundings", after=fan_speed_switch),
     Effect("rain_on_housing", "link", all_parts, share_of_shed(1.0, at_h=(0.5, 1.0), every_h=(4.0, 6.5)),
            "a W/K to air - 4 K for 36 minutes every few hours", family="surroundings", after=rain_on_housing),
     Effect("motor_flange", "link", input_shaft, share_of_shed(0.15), "a W/K to a motor 12 to 66 K above air, by load",

@@ -33,55 +33,75 @@ def of_temperatures(fzg: Gearbox) -> Fit:
 
 
 @pytest.fixture(scope="module")
-def stuck(experiment: Experiment) -> Fit:
-    """A calibration that ended two standard deviations from the middles of the priors."""
-    return experiment.fit(np.full(len(experiment.unknowns), 2.0), iterations=0)
+def usual(experiment: Experiment) -> Fit:
+    return calibrate(experiment)
 
 
-def test_a_first_calibration_that_got_stuck_is_left(experiment: Experiment, stuck: Fit) -> None:
-    usual = calibrate(experiment)
+@pytest.fixture(scope="module")
+def of_instruments(experiment: Experiment) -> Array:
+    """Places of sensors and inputs."""
+    names = [unknown.parameter.name for unknown in experiment.unknowns]
+    prefixes = ("bias_", "lag_", "loss_gain", "delay_", "torque_gain", "ambient_offset")
+    return np.flatnonzero([name.startswith(prefixes) for name in names])
+
+
+@pytest.fixture(scope="module")
+def stuck(experiment: Experiment, usual: Fit, of_instruments: Array) -> Fit:
+    """A calibration of which all but the instruments ended two standard deviations from the middles of the priors."""
+    return experiment.fit(_with(np.full(len(usual.z), 2.0), usual, of_instruments), iterations=0)
+
+
+def test_instruments_stay_as_estimated(experiment: Experiment, usual: Fit, of_instruments: Array) -> None:
+    """Also where readings with other gains and offsets would be far more probable: the machine has none of them."""
+    z = usual.z.copy()
+    z[of_instruments] += 1.0
+    estimated = experiment.fit(z, iterations=0)
+    found = calibrated_to_predict(usual, estimated, usual.z)
+    np.testing.assert_array_equal(found.z[of_instruments], z[of_instruments])
+    assert found.log_evidence < usual.log_evidence - 10.0
+    assert len(of_instruments) == 2 * (len(experiment.pieces[0].channels) - 1) + 5
+
+
+def test_a_first_calibration_that_got_stuck_is_left(usual: Fit, stuck: Fit) -> None:
     assert stuck.log_evidence < usual.log_evidence - 100.0
     assert calibrated_to_predict(usual, stuck).log_evidence > usual.log_evidence - 5.0
     assert calibrated_to_predict(stuck, stuck).log_evidence > usual.log_evidence - 5.0
 
 
 def test_less_random_heat_leads_out_and_errors_are_those_of_what_is_assumed(
-    experiment: Experiment, stuck: Fit, monkeypatch: pytest.MonkeyPatch
+    experiment: Experiment, usual: Fit, stuck: Fit, of_instruments: Array, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     tried: list[float] = []
 
-    def only_if_quiet(one: Experiment, start: Array | None, guesses: object) -> Fit:
+    def only_if_quiet(one: Experiment, start: Array, guesses: object, held: list[int]) -> Fit:
         tried.append(one.random_heat.heat)
-        return stuck if one.random_heat == AS_ASSUMED else calibrate(one, start)
+        return stuck if one.random_heat == AS_ASSUMED else calibrate(one, start, None, held)
 
     monkeypatch.setattr(to_predict, "calibrate", only_if_quiet)
     found = calibrated_to_predict(stuck, stuck)
-    assert tried == [1.0, QUIET.heat]
-    quiet = calibrate(experiment.with_random_heat(QUIET))
+    assert tried == [1.0, 1.0, QUIET.heat]
+    quiet = calibrate(experiment.with_random_heat(QUIET), _with(np.zeros(len(usual.z)), usual, of_instruments),
+                      None, of_instruments.tolist())  # fmt: skip
     np.testing.assert_array_equal(found.z, quiet.z)
     assert found.experiment.random_heat == AS_ASSUMED
     assert np.all(np.diag(found.covariance) >= np.diag(quiet.covariance) - 1e-9)
 
 
 def test_a_fit_that_misses_the_temperatures_by_far_is_not_chosen_however_probable(
-    experiment: Experiment, stuck: Fit, monkeypatch: pytest.MonkeyPatch
+    usual: Fit, stuck: Fit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    usual = calibrate(experiment)
-    monkeypatch.setattr(to_predict, "calibrate", lambda *_: stuck)
+    monkeypatch.setattr(to_predict, "calibrate", lambda _, z, *__: usual if np.array_equal(z, usual.z) else stuck)
     for times, chosen in ((FAR_OFF - 0.1, usual), (FAR_OFF + 0.1, stuck)):
         off_K = {tuple(usual.z): times, tuple(stuck.z): 1.0}
         monkeypatch.setattr(to_predict, "_off_by", lambda one, off_K=off_K: off_K[tuple(one.z)])
         np.testing.assert_array_equal(calibrated_to_predict(usual, stuck).z, chosen.z)
 
 
-def test_a_course_that_has_not_settled_does_not_count(
-    experiment: Experiment, stuck: Fit, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    usual = calibrate(experiment)
+def test_a_course_that_has_not_settled_does_not_count(usual: Fit, stuck: Fit, monkeypatch: pytest.MonkeyPatch) -> None:
     farther = np.full(len(stuck.z), 3.0)
     unsettled = Fit(experiment=usual.experiment, z=farther, linearised=usual.linearised)
     assert unsettled.log_evidence > stuck.log_evidence
-    monkeypatch.setattr(to_predict, "calibrate", lambda *_: stuck)
+    monkeypatch.setattr(to_predict, "calibrate", lambda _, z, *__: unsettled if z[0] == farther[0] else stuck)
     np.testing.assert_array_equal(calibrated_to_predict(unsettled, stuck).z, stuck.z)
 
 
@@ -110,11 +130,18 @@ def test_losses_stay_as_estimated_where_temperatures_allow_it(
 
 
 def test_less_random_heat_counts_only_where_temperatures_come_clearly_nearer(
-    experiment: Experiment, monkeypatch: pytest.MonkeyPatch
+    experiment: Experiment, usual: Fit, of_instruments: Array, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    usual = calibrate(experiment)
-    quiet = calibrate(experiment.with_random_heat(QUIET))
+    start = _with(np.zeros(len(usual.z)), usual, of_instruments)
+    quiet = calibrate(experiment.with_random_heat(QUIET), start, None, of_instruments.tolist())
     assert tuple(quiet.z) != tuple(usual.z)
     for nearer_K, chosen in ((to_predict.NEARER_K - 0.01, usual), (to_predict.NEARER_K + 0.01, quiet)):
         monkeypatch.setattr(to_predict, "_off_by", lambda one, d=nearer_K: d * (tuple(one.z) != tuple(quiet.z)))
         np.testing.assert_allclose(calibrated_to_predict(usual, usual).z, chosen.z, atol=0.05)
+
+
+def _with(z: Array, fit: Fit, places: Array) -> Array:
+    """Unknowns, some of them as in a fit."""
+    found = z.copy()
+    found[places] = fit.z[places]
+    return found
