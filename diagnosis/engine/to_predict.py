@@ -2,30 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 
 from diagnosis.engine.fit import NO_SOLUTION, NOISE_ALONE, Experiment, Fit, Guess, calibrate
-from diagnosis.engine.mean_loss import mean_loss, rests_on_the_definition
+from diagnosis.engine.mean_loss import mean_loss
+from diagnosis.engine.scale import all_sizes_are_unknown, is_of_temperatures
 from diagnosis.engine.set_apart import without_channels
-from diagnosis.engine.unknown import Held, NetworkParameter, TermParameter
+from diagnosis.engine.unknown import Held, NetworkParameter, SensorBias, SensorLag, TermParameter, Unknown
 from diagnosis.forward.whitening import AS_ASSUMED, RandomHeat
 from models.base.types import Array
 from models.quantities.quantities import is_total_loss
+from models.terms.term import Term
 
 QUIET = RandomHeat(heat=0.1, wander=0.1)  # times the random heat that is assumed
 # By which temperatures have to come nearer before parameters may stand in for what the model lacks: with less random
-# heat; with free losses as well, by what thermometers are usually off.
-NEARER_K, LOSSES_K = 0.1, 0.3
+# heat; with what was estimated free as well, by what thermometers are usually off.
+NEARER_K, FREE_K = 0.1, 0.3
 FAR_OFF = 2.0  # times the least error of the temperatures, beyond which a fit predicts too badly to be chosen
 LEAST_SHARE = 1e-6  # of the mean loss that an unknown changes per prior standard deviation
 
 
+@dataclass(frozen=True, kw_only=True)
+class Calibrations:
+    """Calibrations of one machine with the same unknowns free, from several starts; those without a solution left out.
+
+    Attributes
+    ----------
+    usual, quiet : tuple of Fit
+        With random heat as assumed, and with less
+    """
+
+    usual: tuple[Fit, ...]
+    quiet: tuple[Fit, ...]
+
+
 def calibrated_to_predict(plain: Fit, with_error: Fit, start: Array | None = None) -> Fit:
-    """The nominal machine calibrated by noise alone, with instruments as estimated: the best of several calibrations.
+    """The nominal machine calibrated by noise alone: the best of several calibrations.
 
     Parameters
     ----------
@@ -49,23 +66,19 @@ def calibrated_to_predict(plain: Fit, with_error: Fit, start: Array | None = Non
 def _calibrations(
     free: Experiment, with_error: Fit, starts: Sequence[Array], quiet_starts: Sequence[Array],
     guesses: Sequence[Guess] | None = None,
-) -> Mapping[float, Sequence[Fit]]:  # fmt: skip
-    """Calibrations in groups, by what the first ones may be farther off than the best, [K]; those without a solution
-    are left out.
+) -> Iterator[Calibrations]:  # fmt: skip
+    """Calibrations by noise alone: where the definition fixes sizes, first with what could stand in for what the model
+    lacks as it was estimated with model error.
 
-    Instruments stay as estimated with model error in all of them. By noise alone their gains, offsets and lags would
-    stand in for what the model lacks, and a machine that is right with the recorder's errors alone is wrong in an FMU.
+    - Instruments: else a machine may be right with the recorder's errors alone, and wrong in an FMU.
+    - All losses where none is measured: temperatures identify ratios of heats, conductances and capacities, not their
+      common size.
 
-    In the first group losses stay as well, where none is measured but the definition fixes their size. Temperatures
-    identify ratios of heats, conductances and capacities: their common size would stand in for what the model lacks.
+    Where every size is unknown, nothing tells instruments and machine apart.
     """
-    quiet, of_instruments, of_losses = free.with_random_heat(QUIET), _instruments(with_error.experiment), list[int]()
-    if rests_on_the_definition(with_error.experiment):
-        loss, slopes = mean_loss(with_error)
-        of_losses = [
-            index for index, unknown in enumerate(with_error.experiment.unknowns)
-            if isinstance(unknown, NetworkParameter | TermParameter) and abs(slopes[index]) > LEAST_SHARE * loss
-        ]  # fmt: skip
+    quiet, known, estimated = free.with_random_heat(QUIET), with_error.experiment, list[int]()
+    if not all_sizes_are_unknown(known.machine.model.network, known.unknowns):
+        estimated = [*_instruments(known), *(_losses(with_error) if is_of_temperatures(known) else [])]
 
     def calibrated(experiment: Experiment, start: Array, held: Sequence[int]) -> Iterator[Fit]:
         z = start.copy()
@@ -73,14 +86,20 @@ def _calibrations(
         with suppress(*NO_SOLUTION):
             yield calibrate(experiment, z, guesses, held)
 
-    as_estimated, both = list[Fit](), sorted({*of_instruments, *of_losses})
-    for experiment in (free, quiet) if of_losses else ():
-        as_estimated += calibrated(experiment, as_estimated[-1].z if as_estimated else with_error.z, both)
-    return {
-        LOSSES_K: as_estimated,
-        NEARER_K: [fit for start in starts for fit in calibrated(free, start, of_instruments)],
-        0.0: [fit for start in quiet_starts for fit in calibrated(quiet, start, of_instruments)],
-    }
+    for held in (estimated, []) if estimated else ([],):
+        yield Calibrations(
+            usual=tuple(fit for start in starts for fit in calibrated(free, start, held)),
+            quiet=tuple(fit for start in quiet_starts for fit in calibrated(quiet, start, held)),
+        )
+
+
+def _losses(fit: Fit) -> list[int]:
+    """Places of the unknowns of the machine that its losses depend on, with temperatures as they are."""
+    loss, slopes = mean_loss(fit)
+    return [
+        index for index, unknown in enumerate(fit.experiment.unknowns)
+        if isinstance(unknown, NetworkParameter | TermParameter) and abs(slopes[index]) > LEAST_SHARE * loss
+    ]  # fmt: skip
 
 
 def _instruments(experiment: Experiment) -> list[int]:
@@ -93,28 +112,36 @@ def _instruments(experiment: Experiment) -> list[int]:
     ]  # fmt: skip
 
 
-def _best_of(free: Experiment, groups: Mapping[float, Sequence[Fit]]) -> Fit:
+def _best_of(free: Experiment, tried: Iterable[Calibrations]) -> Fit:
     """The most probable of some calibrations that predict well, judged by the noise that is assumed.
 
-    The first group counts that comes as near to the temperatures as the best one, but for its allowance [K]. Random
-    heat lets a course drift off, so that where the model lacks much, a fit which misses the temperatures by kelvins may
-    be the most probable one. With less random heat the courses stay near, but parameters stand in for what the model
-    lacks.
+    Those count that come as near to the temperatures as the best ones of all, but for :data:`FREE_K`, the first such
+    ones; and of these those with less random heat only where they are nearer by :data:`NEARER_K`. Random heat lets a
+    course drift off, so that where the model lacks much, a fit which misses the temperatures by kelvins may be the most
+    probable one. With less random heat the courses stay near, but parameters stand in for what the model lacks.
     """
-    settled: dict[float, list[tuple[float, Fit]]] = {allowed_K: [] for allowed_K in groups}
-    for allowed_K, group in groups.items():
-        for one in group:  # a course that has not settled may look better than it is
-            with suppress(*NO_SOLUTION):
-                again = replace(one.experiment, filters=None).fit(one.z, iterations=0)
-                settled[allowed_K].append((_off_by(again), again))
-    nearest = min((off_K for group in settled.values() for off_K, _ in group), default=np.inf)
-    first = next((group for allowed_K, group in settled.items()
-                  if any(off_K <= nearest + allowed_K for off_K, _ in group)), None)  # fmt: skip
-    if first is None:
-        raise ArithmeticError("the simulation has no solution without model error")
-    farthest = FAR_OFF * min(off_K for off_K, _ in first)
-    best = max((one for off_K, one in first if off_K <= farthest), key=lambda one: one.log_evidence)
-    return best if best.experiment.random_heat == AS_ASSUMED else free.fit(best.z, best.trajectories, iterations=0)
+    settled = [(_settled(one.usual), _settled(one.quiet)) for one in tried]
+    nearest = min((off_K for pair in settled for off_K, _ in chain(*pair)), default=np.inf)
+    for usual, quiet in settled:
+        near = min((off_K for off_K, _ in (*usual, *quiet)), default=np.inf)
+        if near <= nearest + FREE_K and np.isfinite(near):
+            chosen = usual if any(off_K <= near + NEARER_K for off_K, _ in usual) else quiet
+            farthest = FAR_OFF * min(off_K for off_K, _ in chosen)
+            best = max((one for off_K, one in chosen if off_K <= farthest), key=lambda one: one.log_evidence)
+            if best.experiment.random_heat == AS_ASSUMED:
+                return best
+            return free.fit(best.z, best.trajectories, iterations=0)
+    raise ArithmeticError("the simulation has no solution without model error")
+
+
+def _settled(fits: Iterable[Fit]) -> list[tuple[float, Fit]]:
+    """Fits linearised once more, with their errors [K]: a course that has not settled may look better than it is."""
+    found = []
+    for one in fits:
+        with suppress(*NO_SOLUTION):
+            again = replace(one.experiment, filters=None).fit(one.z, iterations=0)
+            found.append((_off_by(again), again))
+    return found
 
 
 def _off_by(fit: Fit) -> float:
@@ -129,11 +156,11 @@ def refit_to_predict(fit: Fit, plain: Fit, apart: Collection[str] = ()) -> Fit:
     Parameters
     ----------
     fit : Fit
-        With model error in its metric, and with random heats that go with it: instruments stay as they are there
+        With model error in its metric, and with random heats that go with it
     plain : Fit
         The nominal machine so calibrated: a second start of the search, because there may be several basins
     apart : collection of str
-        Channels that do not count
+        Channels that do not count; what describes their sensors stays as it is
 
     Raises
     ------
@@ -148,4 +175,18 @@ def refit_to_predict(fit: Fit, plain: Fit, apart: Collection[str] = ()) -> Fit:
     nominal[: len(plain.z)] = plain.z_in(every)
     starts = [fit.z, nominal]
     found = _best_of(counting, _calibrations(counting, fit, starts, starts, fit.trajectories))
-    return every.fit(found.z, found.trajectories, iterations=0) if apart else found
+    if not apart:
+        return found
+    terms = {term.label: term for term in every.machine.terms}
+    own = [_describes(unknown, terms, apart) for unknown in every.unknowns]
+    return every.fit(np.where(own, fit.z, found.z), found.trajectories, iterations=0)
+
+
+def _describes(unknown: Unknown, terms: Mapping[str, Term], channels: Collection[str]) -> bool:
+    """True if an unknown is about the sensors of some channels, and nothing else."""
+    if isinstance(unknown, SensorBias | SensorLag):
+        return unknown.channel in channels
+    if not isinstance(unknown, TermParameter):
+        return False
+    term = terms[unknown.label]
+    return term.kind == "sensor" and set(term.target) <= set(channels)

@@ -72,7 +72,7 @@ sensor_lag = _sensor(
     "sensor_lag",
     "lag",
     places="each thermometer",
-    parameters=lambda _: (strength(60.0, "s", "time constant"),),
+    parameters=lambda _: (strength(60.0, "s", "time constant, on top of the usual or stated one"),),
     law=lambda s: s.strength,
     says="The sensor at {place} answers late: it has bad contact or a heavy sheath.",
     reference="first order, 30 to 120 s",
