@@ -60,12 +60,12 @@ def calibrated_to_predict(plain: Fit, with_error: Fit, start: Array | None = Non
     """
     free = replace(plain.experiment, filters=None)
     first = np.zeros(len(plain.z)) if start is None else start
-    return _best_of(free, _calibrations(free, with_error, [plain.z, with_error.z], [first]))
+    return _best_of(free, _calibrations(free, with_error, [with_error.z], [first], done=[plain]))
 
 
 def _calibrations(
     free: Experiment, with_error: Fit, starts: Sequence[Array], quiet_starts: Sequence[Array],
-    guesses: Sequence[Guess] | None = None,
+    guesses: Sequence[Guess] | None = None, done: Sequence[Fit] = (),
 ) -> Iterator[Calibrations]:  # fmt: skip
     """Calibrations by noise alone: where the definition fixes sizes, first with what could stand in for what the model
     lacks as it was estimated with model error.
@@ -74,7 +74,7 @@ def _calibrations(
     - All losses where none is measured: temperatures identify ratios of heats, conductances and capacities, not their
       common size.
 
-    Where every size is unknown, nothing tells instruments and machine apart.
+    Where every size is unknown, nothing tells instruments and machine apart. `done`: known ones with all free.
     """
     quiet, known, estimated = free.with_random_heat(QUIET), with_error.experiment, list[int]()
     if not all_sizes_are_unknown(known.machine.model.network, known.unknowns):
@@ -88,7 +88,7 @@ def _calibrations(
 
     for held in (estimated, []) if estimated else ([],):
         yield Calibrations(
-            usual=tuple(fit for start in starts for fit in calibrated(free, start, held)),
+            usual=(*(() if held else done), *(fit for start in starts for fit in calibrated(free, start, held))),
             quiet=tuple(fit for start in quiet_starts for fit in calibrated(quiet, start, held)),
         )
 

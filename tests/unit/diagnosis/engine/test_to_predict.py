@@ -51,8 +51,10 @@ def stuck(experiment: Experiment, usual: Fit, of_instruments: Array) -> Fit:
     return experiment.fit(_with(np.full(len(usual.z), 2.0), usual, of_instruments), iterations=0)
 
 
-def test_instruments_stay_as_estimated(experiment: Experiment, usual: Fit, of_instruments: Array) -> None:
-    """Also where readings with other gains and offsets would be far more probable: the machine has none of them."""
+def test_instruments_stay_as_estimated_where_temperatures_allow_it(
+    experiment: Experiment, usual: Fit, of_instruments: Array, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where other gains and offsets would be far more probable: the machine has none of them."""
     z = usual.z.copy()
     z[of_instruments] += 1.0
     estimated = experiment.fit(z, iterations=0)
@@ -60,6 +62,16 @@ def test_instruments_stay_as_estimated(experiment: Experiment, usual: Fit, of_in
     np.testing.assert_array_equal(found.z[of_instruments], z[of_instruments])
     assert found.log_evidence < usual.log_evidence - 10.0
     assert len(of_instruments) == 2 * (len(experiment.pieces[0].channels) - 1) + 5
+
+    def free(fit: Fit) -> bool:
+        return bool(np.any(fit.z[of_instruments] != z[of_instruments]))
+
+    for off_K, are_free in ((to_predict.FREE_K - 0.01, False), (to_predict.FREE_K + 0.01, True)):
+        monkeypatch.setattr(to_predict, "_off_by", lambda one, off_K=off_K: 0.0 if free(one) else off_K)
+        assert free(calibrated_to_predict(usual, estimated, usual.z)) is are_free
+    monkeypatch.undo()
+    monkeypatch.setattr(to_predict, "all_sizes_are_unknown", lambda *_: True)  # nothing tells instruments from machine
+    assert free(calibrated_to_predict(usual, estimated, usual.z))
 
 
 def test_a_first_calibration_that_got_stuck_is_left(usual: Fit, stuck: Fit) -> None:
@@ -79,7 +91,7 @@ def test_less_random_heat_leads_out_and_errors_are_those_of_what_is_assumed(
 
     monkeypatch.setattr(to_predict, "calibrate", only_if_quiet)
     found = calibrated_to_predict(stuck, stuck)
-    assert tried == [1.0, 1.0, QUIET.heat]
+    assert tried == 2 * [1.0, QUIET.heat]  # with instruments as estimated, and with all free
     quiet = calibrate(experiment.with_random_heat(QUIET), _with(np.zeros(len(usual.z)), usual, of_instruments),
                       None, of_instruments.tolist())  # fmt: skip
     np.testing.assert_array_equal(found.z, quiet.z)
@@ -90,7 +102,8 @@ def test_less_random_heat_leads_out_and_errors_are_those_of_what_is_assumed(
 def test_a_fit_that_misses_the_temperatures_by_far_is_not_chosen_however_probable(
     usual: Fit, stuck: Fit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(to_predict, "calibrate", lambda _, z, *__: usual if np.array_equal(z, usual.z) else stuck)
+    monkeypatch.setattr(to_predict, "calibrate", lambda *_: stuck)
+    monkeypatch.setattr(to_predict, "all_sizes_are_unknown", lambda *_: True)
     for times, chosen in ((FAR_OFF - 0.1, usual), (FAR_OFF + 0.1, stuck)):
         off_K = {tuple(usual.z): times, tuple(stuck.z): 1.0}
         monkeypatch.setattr(to_predict, "_off_by", lambda one, off_K=off_K: off_K[tuple(one.z)])
@@ -124,7 +137,7 @@ def test_losses_stay_as_estimated_where_temperatures_allow_it(
     assert found.z[names.index("h_air")] > of_temperatures.z[names.index("h_air")] + 0.1  # the rest follows
 
     held = tuple(estimated.z[of_losses])
-    off_K = to_predict.LOSSES_K + 0.01
+    off_K = to_predict.FREE_K + 0.01
     monkeypatch.setattr(to_predict, "_off_by", lambda one: off_K if tuple(one.z[of_losses]) == held else 0.0)
     assert tuple(calibrated_to_predict(of_temperatures, estimated).z[of_losses]) != held
 
