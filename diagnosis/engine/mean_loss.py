@@ -4,16 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.engine.fit import Experiment, Fit
-from diagnosis.engine.scale import all_sizes_are_unknown, is_of_temperatures
+from diagnosis.engine.fit import Fit
 from diagnosis.engine.unknown import in_scope
 from models.base.types import Array
-
-
-def rests_on_the_definition(experiment: Experiment) -> bool:
-    """True if no loss is measured, but sizes of the definition that no unknown scales fix how large it is."""
-    network = experiment.machine.model.network
-    return is_of_temperatures(experiment) and not all_sizes_are_unknown(network, experiment.unknowns)
 
 
 def mean_loss(fit: Fit) -> tuple[float, Array]:

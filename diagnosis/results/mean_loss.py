@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.engine.fit import Fit
-from diagnosis.engine.mean_loss import mean_loss, rests_on_the_definition
+from diagnosis.engine.mean_loss import mean_loss
 from diagnosis.engine.predict import Prediction
+from diagnosis.engine.scale import all_sizes_are_unknown, is_of_temperatures
 
 FAR_SD = 2.0  # standard errors from the estimate, beyond which a model is not to be asked for losses
 
@@ -48,10 +49,12 @@ def mean_loss_of(believed: Fit, fit: Fit, run: Sequence[Prediction]) -> MeanLoss
     run : sequence of Prediction
         Of the recordings that were learnt from, by that model
     """
-    if not rests_on_the_definition(believed.experiment):
+    experiment, is_loss = believed.experiment, fit.experiment.machine.model.is_loss
+    network = experiment.machine.model.network
+    if not is_of_temperatures(experiment) or all_sizes_are_unknown(network, experiment.unknowns):
         return None
-    (estimate, slopes), is_loss = mean_loss(believed), fit.experiment.machine.model.is_loss
-    tested = [run[index] for index in believed.experiment.tested]
+    estimate, slopes = mean_loss(believed)
+    tested = [run[index] for index in experiment.tested]
     loss = np.concatenate([one.trajectory.balance.sources[:, is_loss].sum(axis=-1) for one in tested])
     return MeanLoss(
         estimate_W=estimate, stderr_W=float(np.sqrt(slopes @ believed.covariance @ slopes)),
