@@ -53,44 +53,61 @@ def calibrated_to_predict(plain: Fit, with_error: Fit, start: Array | None = Non
     start : Array, shape (unknowns,), or None
         Where the first calibration began; by default at the middles of the priors
 
-    Raises
-    ------
-    ArithmeticError
-        If there is no solution.
+    Returns
+    -------
+    Fit
+        The first calibration if none of the others has a solution
     """
-    free = replace(plain.experiment, filters=None)
+    free, estimated = replace(plain.experiment, filters=None), _estimated(with_error)
     first = np.zeros(len(plain.z)) if start is None else start
-    return _best_of(free, _calibrations(free, with_error, [with_error.z], [first], done=[plain]))
+    tried = _calibrations(free, with_error.z, estimated, [with_error.z], [first])
+    if not estimated[-1]:
+        tried = [replace(one, usual=(plain, *one.usual)) for one in tried]
+    with suppress(ArithmeticError):
+        return _best_of(free, tried)
+    return plain
+
+
+def _estimated(with_error: Fit) -> list[list[int]]:
+    """Places of the unknowns that stay as they were estimated with model error, and of those that do so if they can.
+
+    All could stand in for what the model lacks. Where the definition fixes sizes, instruments stay: else a machine may
+    be right with the recorder's errors alone, and wrong in an FMU. Where no loss is measured there, all losses stay if
+    they can: temperatures identify ratios of heats, conductances and capacities, not their common size.
+
+    Returns
+    -------
+    list of list of int
+        Most are held first; the last one is empty where every size is unknown: nothing tells instruments and machine
+        apart
+    """
+    known = with_error.experiment
+    if all_sizes_are_unknown(known.machine.model.network, known.unknowns):
+        return [[]]
+    instruments = _instruments(known)
+    return [*([[*instruments, *_losses(with_error)]] if is_of_temperatures(known) else []), instruments]
 
 
 def _calibrations(
-    free: Experiment, with_error: Fit, starts: Sequence[Array], quiet_starts: Sequence[Array],
-    guesses: Sequence[Guess] | None = None, done: Sequence[Fit] = (),
-) -> Iterator[Calibrations]:  # fmt: skip
-    """Calibrations by noise alone: where the definition fixes sizes, first with what could stand in for what the model
-    lacks as it was estimated with model error.
-
-    - Instruments: else a machine may be right with the recorder's errors alone, and wrong in an FMU.
-    - All losses where none is measured: temperatures identify ratios of heats, conductances and capacities, not their
-      common size.
-
-    Where every size is unknown, nothing tells instruments and machine apart. `done`: known ones with all free.
-    """
-    quiet, known, estimated = free.with_random_heat(QUIET), with_error.experiment, list[int]()
-    if not all_sizes_are_unknown(known.machine.model.network, known.unknowns):
-        estimated = [*_instruments(known), *(_losses(with_error) if is_of_temperatures(known) else [])]
+    free: Experiment, estimate: Array, held_in_turn: Sequence[Sequence[int]], starts: Sequence[Array],
+    quiet_starts: Sequence[Array], guesses: Sequence[Guess] | None = None,
+) -> list[Calibrations]:  # fmt: skip
+    """Calibrations by noise alone from several starts, with some unknowns at an estimate."""
+    quiet = free.with_random_heat(QUIET)
 
     def calibrated(experiment: Experiment, start: Array, held: Sequence[int]) -> Iterator[Fit]:
         z = start.copy()
-        z[held] = with_error.z[held]
+        z[held] = estimate[held]
         with suppress(*NO_SOLUTION):
             yield calibrate(experiment, z, guesses, held)
 
-    for held in (estimated, []) if estimated else ([],):
-        yield Calibrations(
-            usual=(*(() if held else done), *(fit for start in starts for fit in calibrated(free, start, held))),
+    return [
+        Calibrations(
+            usual=tuple(fit for start in starts for fit in calibrated(free, start, held)),
             quiet=tuple(fit for start in quiet_starts for fit in calibrated(quiet, start, held)),
         )
+        for held in held_in_turn
+    ]
 
 
 def _losses(fit: Fit) -> list[int]:
@@ -173,13 +190,14 @@ def refit_to_predict(fit: Fit, plain: Fit, apart: Collection[str] = ()) -> Fit:
     counting = without_channels(every, apart) if apart else every
     nominal = fit.z.copy()
     nominal[: len(plain.z)] = plain.z_in(every)
-    starts = [fit.z, nominal]
-    found = _best_of(counting, _calibrations(counting, fit, starts, starts, fit.trajectories))
-    if not apart:
-        return found
     terms = {term.label: term for term in every.machine.terms}
-    own = [_describes(unknown, terms, apart) for unknown in every.unknowns]
-    return every.fit(np.where(own, fit.z, found.z), found.trajectories, iterations=0)
+    own = [index for index, unknown in enumerate(every.unknowns) if _describes(unknown, terms, apart)]
+    nominal[own] = fit.z[own]
+    found = _best_of(counting, _calibrations(
+        counting, nominal if apart else fit.z,  # a broken sensor has bent what was estimated of the others
+        [[*own, *held] for held in _estimated(fit)], [fit.z, nominal], [fit.z, nominal], fit.trajectories,
+    ))  # fmt: skip
+    return every.fit(found.z, found.trajectories, iterations=0) if apart else found
 
 
 def _describes(unknown: Unknown, terms: Mapping[str, Term], channels: Collection[str]) -> bool:

@@ -105,6 +105,8 @@ def test_a_fit_without_error_keeps_the_values_of_faulty_sensors_and_has_the_assu
     at = next(i for i, u in enumerate(experiment.unknowns) if isinstance(u, SensorBias) and u.channel == BROKEN)
     z = fit.z.copy()
     z[at] = 9.0
+    bent = next(i for i, u in enumerate(experiment.unknowns) if isinstance(u, SensorBias) and u.channel != BROKEN)
+    z[bent] += 5.0  # by the broken one
     less = experiment.with_random_heat(RandomHeat(heat=0.25, wander=0.25))
     given = less.with_filters(plain.parts).fit(z, iterations=0)
     found = refit_to_predict(given, fit, apart)
