@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from diagnosis.candidates.hypotheses import hypothesis_of
-from diagnosis.engine import set_apart
+from diagnosis.engine import set_apart, to_predict
 from diagnosis.engine.calibration import calibrate_with_error
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.prepare import prepare_experiment
@@ -99,7 +99,9 @@ def test_how_far_a_session_may_deviate_the_sound_channels_say_for_all() -> None:
     assert found.near.experiment.most_deviation == 0.2 < experiment.most_deviation
 
 
-def test_a_fit_without_error_keeps_the_values_of_faulty_sensors_and_has_the_assumed_random_heat() -> None:
+def test_a_fit_without_error_keeps_the_values_of_faulty_sensors_and_has_the_assumed_random_heat(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     experiment, plain = rod()
     fit, apart = calibrate_apart(experiment, plain)
     at = next(i for i, u in enumerate(experiment.unknowns) if isinstance(u, SensorBias) and u.channel == BROKEN)
@@ -113,3 +115,6 @@ def test_a_fit_without_error_keeps_the_values_of_faulty_sensors_and_has_the_assu
     assert found.z[at] == 9.0
     assert found.experiment.noise == experiment.noise and found.experiment.random_heat == AS_ASSUMED
     assert np.delete(found.z, at) == pytest.approx(np.delete(calibrated_to_predict(fit, fit, z).z, at), abs=0.3)
+    monkeypatch.setattr(to_predict, "all_sizes_are_unknown", lambda *_: False)  # where instruments stay
+    found = refit_to_predict(given, fit, apart)
+    assert found.z[at] == 9.0 and found.z[bent] == fit.z[bent]
