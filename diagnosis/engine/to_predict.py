@@ -78,8 +78,8 @@ def _estimated(with_error: Fit) -> list[list[int]]:
     Returns
     -------
     list of list of int
-        Most are held first; the last one is empty where every size is unknown: nothing tells instruments and machine
-        apart
+        Most are held first; the last one is empty where every size is unknown: nothing separates instruments and
+        machine there
     """
     known = with_error.experiment
     if all_sizes_are_unknown(known.machine.model.network, known.unknowns):
