@@ -29,7 +29,7 @@ NOT_REAL = (*ONLY_NEW, "recordings", "truth", "continued", "jobs")
 @click.option("--plant", type=click.Choice(["own", "zoo"]), default="own", show_default=True,
               help="Kind of plant that makes the cases.")  # fmt: skip
 @click.option("--cases", type=click.IntRange(min=1, max=10_000), default=None, metavar="N",
-              help="Number of cases.  [default: 247 (own), 60 (zoo)]")  # fmt: skip
+              help="Number of cases.  [default: 251 (own), 60 (zoo)]")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0, max=2**32 - 1), default=None, metavar="N",
               help="Seed of the cases.  [default: 2044 (own), 3003 (zoo), which nobody has opened]")  # fmt: skip
 @click.option("--recordings", type=click.Path(path_type=Path, file_okay=False, exists=True), default=None,

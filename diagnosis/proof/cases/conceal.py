@@ -62,7 +62,7 @@ def mix_of(cases: int, mix: Mapping[str, int] = PROOF_MIX) -> dict[str, int]:
     Examples
     --------
     >>> mix_of(60)
-    {'control': 15, 'single': 20, 'double': 7, 'messy': 7, 'outside': 7, 'sensor': 4}
+    {'control': 14, 'single': 21, 'double': 7, 'messy': 7, 'outside': 7, 'sensor': 4}
     >>> mix_of(WHOLE) == PROOF_MIX
     True
     """

@@ -390,16 +390,16 @@ def test_a_sensor_fault(assembled_alike: Assemble, prepared: Prepared, windage: 
     (setup, _, plain), assembled = prepared, assembled_alike
     effect = replace(effect_of(setup, plain, "sensor_bias", "oil"), log_prior=-3.0)
     assert effect.term is not None
-    fit = _fit_with(plain, effect, {effect.term.strength.name: 3.0})
+    fit = _fit_with(plain, effect, {effect.term.strength.name: 0.2})
     judged = Judged(effects=(effect,), log_bayes=70.0, fit=fit, error_class=error_classes()[0])
     claim = Answer(best=judged, effect=effect, grade="claim", probability=0.98, joint=0.98)
     found = assembled(posterior_of(plain, judged), [claim])
     (finding,) = found.findings
     assert (found.verdict, finding.kind, finding.node, finding.heat_mean_W) == ("sensor_fault", "sensor", "oil", 0.0)
     calibrated = {u.parameter.name: u.value(z) for u, z in zip(fit.experiment.unknowns, fit.z.tolist(), strict=True)}
-    assert finding.parameters[0].value == pytest.approx(3.0 + calibrated["bias_oil"])
-    (term,) = found.terms  # the sound readings do not ask for it
-    assert abs(term.parameters[0].start) < 1.0
+    assert finding.parameters[0].value == pytest.approx(0.2 + calibrated["bias_oil"])
+    (term,) = found.terms
+    assert term.parameters[0].start == pytest.approx(0.2)  # as estimated
     assert "in the measurement" in str(found)
     assert read_answer(found.to_dict(), fzg).claims[0].what == "sensor"
     tied = Answer(best=judged, effect=effect, grade="likely", probability=0.75, joint=0.97,
