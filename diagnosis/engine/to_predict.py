@@ -21,8 +21,8 @@ from models.terms.term import Term
 
 QUIET = RandomHeat(heat=0.1, wander=0.1)  # times the random heat that is assumed
 # By which temperatures have to come nearer before parameters may stand in for what the model lacks: with less random
-# heat; with what was estimated free as well, by what thermometers are usually off.
-NEARER_K, FREE_K = 0.1, 0.3
+# heat; with free losses as well, by what thermometers are usually off.
+NEARER_K, LOSSES_K = 0.1, 0.3
 FAR_OFF = 2.0  # times the least error of the temperatures, beyond which a fit predicts too badly to be chosen
 LEAST_SHARE = 1e-6  # of the mean loss that an unknown changes per prior standard deviation
 
@@ -132,7 +132,7 @@ def _instruments(experiment: Experiment) -> list[int]:
 def _best_of(free: Experiment, tried: Iterable[Calibrations]) -> Fit:
     """The most probable of some calibrations that predict well, judged by the noise that is assumed.
 
-    Those count that come as near to the temperatures as the best ones of all, but for :data:`FREE_K`, the first such
+    Those count that come as near to the temperatures as the best ones of all, but for :data:`LOSSES_K`, the first such
     ones; and of these those with less random heat only where they are nearer by :data:`NEARER_K`. Random heat lets a
     course drift off, so that where the model lacks much, a fit which misses the temperatures by kelvins may be the most
     probable one. With less random heat the courses stay near, but parameters stand in for what the model lacks.
@@ -141,7 +141,7 @@ def _best_of(free: Experiment, tried: Iterable[Calibrations]) -> Fit:
     nearest = min((off_K for pair in settled for off_K, _ in chain(*pair)), default=np.inf)
     for usual, quiet in settled:
         near = min((off_K for off_K, _ in (*usual, *quiet)), default=np.inf)
-        if near <= nearest + FREE_K and np.isfinite(near):
+        if near <= nearest + LOSSES_K and np.isfinite(near):
             chosen = usual if any(off_K <= near + NEARER_K for off_K, _ in usual) else quiet
             farthest = FAR_OFF * min(off_K for off_K, _ in chosen)
             best = max((one for off_K, one in chosen if off_K <= farthest), key=lambda one: one.log_evidence)

@@ -20,6 +20,8 @@ from models.mechanisms.forms import (
     two_point,
 )
 from models.mechanisms.mechanism import Mechanism
+from models.mechanisms.scale import Scale
+from models.network.laws import Parameter
 
 FAMILY = "surroundings"
 HOUR_S = 3600.0
@@ -71,6 +73,11 @@ rain_on_housing = Mechanism(
     experiment="log the weather, or repeat under a roof",
 )
 
+
+def _fan(scale: Scale, description: str = "additional conductance to the air") -> Parameter:
+    return strength(0.7 * scale.conductance, "W/K", description)
+
+
 fan_thermostat = Mechanism(
     name="fan_thermostat",
     family=FAMILY,
@@ -78,7 +85,7 @@ fan_thermostat = Mechanism(
     places=("housing",),
     other="air",
     parameters=lambda scale: (
-        strength(0.7 * scale.conductance, "W/K", "additional conductance to the air"),
+        _fan(scale),
         temperature(
             "set_point",
             share_between(scale, 0.7),
@@ -102,7 +109,7 @@ fan_on_shaft = Mechanism(
     places=("housing",),
     other="air",
     parameters=lambda scale: (
-        strength(0.7 * scale.conductance, "W/K", "additional conductance to the air at the reference speed"),
+        _fan(scale, "additional conductance to the air at the reference speed"),
         plain("exponent", 0.7, sd=0.25, lower=0.2, upper=1.5, grid=(0.5, 0.9)),
     ),
     law=lambda s: s.strength * s.n**s.exponent,
@@ -122,7 +129,7 @@ fan_speed_switch = Mechanism(
     places=("housing",),
     other="air",
     parameters=lambda scale: (
-        strength(0.7 * scale.conductance, "W/K", "additional conductance to the air"),
+        _fan(scale),
         positive("switch", 0.6, sd=0.8, grid=(0.05, 0.3, 0.6, 0.9, 1.2)),
     ),
     law=lambda s: s.strength * rises(s.n, at=s.switch, power=SWITCHES),

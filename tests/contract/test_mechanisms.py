@@ -344,6 +344,21 @@ def test_no_place_in_a_network_without_the_part() -> None:
     assert placed("run_in_seals") and not CATALOGUE["run_in_seals"].placed(bare, SCALES["fzg"])
 
 
+def test_fans_follow_the_speed() -> None:
+    """On the shaft by the power law, by a switch within a tenth of its speed; backwards as forwards, none at rest."""
+    reference = SCALES["fzg"].speed
+    speed = reference * np.array([0.0, 0.54, 0.66, 1.0, -1.0, 2.0])
+    expected = {
+        "fan_on_shaft": pytest.approx(np.abs(speed / reference) ** 0.7),
+        "fan_speed_switch": pytest.approx([0.0, 0.0, 1.0, 1.0, 1.0, 1.0], abs=0.1),
+    }
+    for name, shares in expected.items():
+        (term,) = placed(name)
+        values = {symbol(p.name): p.start for p in term.parameters} | {symbol(term.strength.name): 1.0}
+        law = term.expression.subs(values)
+        assert [float(law.subs(symbol("speed"), value)) for value in speed] == shares
+
+
 def test_a_catalogue_to_choose_from() -> None:
     assert len(CATALOGUE) >= 32
     assert all(mechanism.placed(NETWORKS["fzg"], SCALES["fzg"]) for mechanism in CATALOGUE.values())

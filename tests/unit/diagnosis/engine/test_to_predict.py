@@ -143,7 +143,7 @@ def test_losses_stay_as_estimated_where_temperatures_allow_it(
     assert found.z[names.index("h_air")] > of_temperatures.z[names.index("h_air")] + 0.1  # the rest follows
 
     held = tuple(estimated.z[of_losses])
-    off_K = to_predict.FREE_K + 0.01
+    off_K = to_predict.LOSSES_K + 0.01
     monkeypatch.setattr(to_predict, "_off_by", lambda one: off_K if tuple(one.z[of_losses]) == held else 0.0)
     assert tuple(calibrated_to_predict(of_temperatures, estimated).z[of_losses]) != held
 
