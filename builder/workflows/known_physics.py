@@ -45,7 +45,8 @@ def known_finding(
             raise InputError(f"{name} has no parameter {key!r}{did_you_mean(key, own)}; it has {', '.join(own)}")
         p = own[key]
         if not p.lower <= value <= p.upper:
-            raise InputError(f"{key} = {value:g} is outside {p.lower:.4g} to {p.upper:.4g} {p.unit} of {name}")
+            unit = "" if p.unit == "1" else f" {p.unit}"
+            raise InputError(f"{key} = {value:g} is outside {p.lower:.4g} to {p.upper:.4g}{unit} of {name}")
     strength = term.strength
     if _local(term, strength) not in given:
         raise InputError(f"the strength of {name} is missing: {strength.description or 'its size'} [{strength.unit}], "

@@ -56,6 +56,7 @@ def test_a_simulation_has_it(file: Path, tmp_path: Path, run_cli: RunCli) -> Non
     (("fan_thermostt", "--set", "strength=1"), "did you mean 'fan_thermostat'?"),
     (("fan_thermostat", "--set", "strength=1", "--set", "setpoint=5"), "did you mean 'set_point'?"),
     (("fan_thermostat", "--set", "strength=1", "--set", "set_point=900"), "set_point = 900 is outside -60 to 250 degC"),
+    (("fan_speed_switch", "--set", "strength=1", "--set", "switch=900"), "switch = 900 is outside 0.012 to 30 of fan_"),
     (("fan_thermostat", "--set", "strength=nan"), "strength = nan is outside"),
     (("fan_thermostat", "--set", "strength=1:-2"), "the standard error is -2; it is 0 or more"),
     (("fan_thermostat", "--set", "strength"), "is not NAME=VALUE"),
