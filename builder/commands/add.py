@@ -32,6 +32,7 @@ def add(file: Path, mechanism: str, gearbox: str, place: str | None, given: tupl
     """
     with progress(LOADING):
         from builder.workflows.known_physics import known_finding
+        from models.mechanisms import Scale
 
     if file.suffix != ENDING:
         raise InputError(f"{file}: a correction ends in {ENDING}; choose such a name")
@@ -51,6 +52,9 @@ def add(file: Path, mechanism: str, gearbox: str, place: str | None, given: tupl
         rows.append([local, "given" if local in numbers else "typical", p.description, f"{p.value:.4g}", error, p.unit])
     console.table(f"{mechanism} at {finding.place}", ["number", "", "", "value", "standard error", "unit"], rows,
                   text_columns=3)  # fmt: skip
+    scale = Scale.of(definition)
+    console.out.print(f"the reference, which relative values go by: {scale.speed:.4g} 1/min and {scale.torque:.4g} N m "
+                      "at the input shaft")  # fmt: skip
     console.out.print(f"wrote {file}; simulate, build-fmu and diagnose take it as --correction")
 
 

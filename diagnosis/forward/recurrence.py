@@ -1,12 +1,11 @@
-"""Linear recurrences along the rows of a recording, all rows at once: by doubling how far back every row looks."""
+"""Linear recurrences along the rows of a recording: banded triangular systems, which LAPACK solves row by row."""
 
 from __future__ import annotations
 
 import numpy as np
+from scipy.linalg.lapack import dtbtrs
 
 from models.base.types import Array
-
-FORGOTTEN = 1e-15  # share of an older value in a later one
 
 
 def recurrence(slope: Array, driven: Array) -> Array:
@@ -14,26 +13,27 @@ def recurrence(slope: Array, driven: Array) -> Array:
 
     Parameters
     ----------
-    slope : Array, shape (N, ...)
-        Broadcastable against `driven`; the first one is not used
-    driven : Array, shape (N, ...)
+    slope : Array, shape (N, V), or (N, 1) for one that all columns have
+        The first row is not used
+    driven : Array, shape (N, V)
 
     Returns
     -------
-    Array, shape (N, ...)
+    Array, shape (N, V)
 
     Examples
     --------
-    >>> recurrence(np.array([0.0, 0.5, 1.0, 0.0]), np.array([8.0, 1.0, 0.0, 2.0]))
+    >>> recurrence(np.array([[0.0], [0.5], [1.0], [0.0]]), np.array([[8.0], [1.0], [0.0], [2.0]]))[:, 0]
     array([8., 5., 5., 2.])
     """
-    result, left, reach = np.array(driven, dtype=float), np.array(slope, dtype=float), 1
-    left[:1] = 0.0
-    while reach < len(result) and float(np.abs(left).max()) > FORGOTTEN:
-        result[reach:] += left[reach:] * result[:-reach]
-        left[reach:] = left[reach:] * left[:-reach]
-        left[:reach] = 0.0
-        reach *= 2
+    band = np.ones((2, len(driven)), order="F")  # the diagonal, and below it what one row takes from the row before
+    if slope.shape[1] == 1:
+        band[1, :-1] = -slope[1:, 0]
+        return np.asarray(dtbtrs(band, driven, uplo="L", diag="U")[0])
+    result = np.empty(driven.shape, order="F")
+    for column, one in enumerate(slope.T):
+        band[1, :-1] = -one[1:]
+        result[:, column] = dtbtrs(band, driven[:, column], uplo="L", diag="U")[0]
     return result
 
 
@@ -57,7 +57,7 @@ def lagged(values: Array, steps: Array, lag: float) -> Array:
         return values
     decays = np.exp(-steps / lag)
     shares = lag * (1.0 - decays) / steps
-    decays, shares = (x.reshape(-1, *[1] * (values.ndim - 1)) for x in (decays, shares))
-    driven = np.array(values, dtype=float)
-    driven[1:] = (shares - decays) * values[:-1] + (1.0 - shares) * values[1:]
-    return recurrence(np.concatenate([decays[:1], decays]), driven)
+    flat = values.reshape(len(values), -1)
+    driven, decays, shares = np.array(flat, dtype=float), decays[:, None], shares[:, None]
+    driven[1:] = (shares - decays) * flat[:-1] + (1.0 - shares) * flat[1:]
+    return recurrence(np.concatenate([decays[:1], decays]), driven).reshape(values.shape)

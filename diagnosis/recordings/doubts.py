@@ -91,7 +91,7 @@ def _off_when_cold(found: RecordedRows, network: RecordedMachine) -> Iterator[st
         return
     middle = float(np.median([*firsts.values()]))
     for quantity, first in firsts.items():
-        if abs(first - middle) > AGREE_K:
+        if abs(first - middle) > AGREE_K and found.roles[quantity].bias_sd is None:
             yield (
                 f"{found.names[quantity]} begins {abs(first - middle):.1f} K {'above' if first > middle else 'below'} "
                 "the other thermometers, which agree as in a machine that has stood still: if it is wrong, state its "

@@ -98,7 +98,7 @@ def _missing(d: Diagnosis) -> str:
         return f"No physics, but a parameter is outside its prior: {reached}."
     if d.log_e_value > d.threshold:
         back = f"; the held-out readings take {-d.holdout_gain:.1f} nat of it back" if d.holdout_gain <= -1.0 else ""
-        return f"Yes{_in_what(d)}: {reached}{back}."
+        return f"{'Yes' if _is_clear(d) else 'Probably'}{_in_what(d)}: {reached}{back}."
     if _cannot_be_fitted(d) and not d.spoiled and d.train.calibrated <= d.train.before + d.noise_K:
         off_K, what = _farthest(d)
         return (
@@ -142,6 +142,11 @@ def _farthest(d: Diagnosis) -> tuple[float, str]:
     return max((error for error in errors if not math.isnan(error[0])), default=(0.0, ""))
 
 
+def _is_clear(d: Diagnosis) -> bool:
+    """False of evidence that hardly exceeds what is needed: one half of the probability is left to nothing there."""
+    return 1.0 - d.kinds.get("nothing", 0.0) >= d.settings.claim_from
+
+
 def _in_what(d: Diagnosis) -> str:
     """The model or the measurement; with a word of caution where the other one has some probability too."""
     if d.verdict == "unexplained":
@@ -150,7 +155,7 @@ def _in_what(d: Diagnosis) -> str:
     if _may_be_either(d):
         return ", in the measurement or in the model"
     measurement = sum(one.probability for one in d.ranking if one.family == MEASUREMENT)
-    sure = (measurement if fault else 1.0 - measurement) >= d.settings.claim_from
+    sure = (measurement if fault else 1.0 - measurement) >= d.settings.claim_from or not _is_clear(d)
     return f", {'' if sure else 'probably '}in the {'measurement' if fault else 'model'}"
 
 
@@ -278,9 +283,13 @@ def _how_much_better(d: Diagnosis) -> tuple[str, ...]:
             "What was learnt of model error is left out: with it held-out temperatures are missed by "
             f"{d.left_out_K:.2f} K"
         )
-    if d.has_correction and d.holdout.after > d.holdout.calibrated:
+    not_closer = d.has_correction and d.holdout.after > d.holdout.calibrated
+    nat = f"{abs(d.holdout_gain):.0f} nat" if abs(d.holdout_gain) >= 1.0 else "less than one nat"
+    if not_closer:
+        course = f"; with model error allowed for they are more probable with the correction, by {nat} of log score"
         lines.append(
             "Held-out temperatures are not closer than with the calibrated model: predict with calibrated.toml"
+            f"{course if d.holdout_gain > 0.0 else ''}"
         )
     lines += [
         f"{name} is missed: {d.holdout.recordings[name].after:.2f} K, where it was learnt from {d.train.after:.2f} K"
@@ -293,9 +302,9 @@ def _how_much_better(d: Diagnosis) -> tuple[str, ...]:
         lines.append(
             f"The correction also holds {further} effect{'s' * (further > 1)} without a certain name (grade learnt)"
         )
-    if d.has_correction and math.isfinite(d.holdout_gain) and d.holdout_gain != 0.0:  # 0: nothing was fitted
+    fitted = d.has_correction and math.isfinite(d.holdout_gain) and d.holdout_gain != 0.0
+    if fitted and not (not_closer and d.holdout_gain > 0.0):
         way = "better than" if d.holdout_gain > 0.0 else "worse than"
-        nat = f"{abs(d.holdout_gain):.0f} nat" if abs(d.holdout_gain) >= 1.0 else "less than one nat"
         lines.append(f"Held-out readings are predicted {way} by the calibrated model, by {nat} of log score")
     if d.contradicted:
         if d.holdout.contradict(d.holdout_gain, d.noise_K, d.further_threshold):

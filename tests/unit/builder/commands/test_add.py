@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+import sympy as sp
 
 from models.assembly.gearbox import Gearbox
 from models.correction.correction import read_correction
@@ -31,6 +33,17 @@ def test_given_numbers_are_as_exact_as_said_and_the_others_are_typical(
     numbers = {p.name.removeprefix("fan_thermostat_housing_"): (p.value, p.stderr) for p in fan.parameter}
     assert numbers == {"strength": (7.0, 0.0), "set_point": (55.0, 2.0), "band": (6.0, 3.0)}
     assert (pump.parameter[0].value, pump.parameter[0].stderr) == (20.0, 5.0)
+
+
+def test_the_speed_that_numbers_are_relative_to_is_shown(
+    fzg: Gearbox, file: Path, run_cli: RunCli, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run_cli("add", file, "fan_speed_switch", "--set", "strength=7", "--set", "switch=0.6") == 0
+    shown = re.search(r"relative values go by: (\S+) 1/min and \S+ N m", capsys.readouterr().out)
+    (fan,) = read_correction(file, fzg).findings
+    values = {p.name: p.value for p in fan.parameter}
+    law = sp.sympify(fan.law).subs(values)
+    assert shown and float(law.subs("speed", 0.6 * float(shown[1]))) == pytest.approx(3.5, rel=0.02)
 
 
 def test_the_file_is_of_one_gearbox(file: Path, run_cli: RunCli, capsys: pytest.CaptureFixture[str]) -> None:

@@ -74,3 +74,9 @@ def test_a_doubt_is_the_first_note(tmp_path: Path, fzg: Gearbox, case: str) -> N
 ])  # fmt: skip
 def test_a_sound_recording_raises_none(tmp_path: Path, fzg: Gearbox, source: pd.DataFrame) -> None:
     assert all("was not recorded" in note for note in notes(tmp_path, fzg, source))
+
+
+def test_a_tolerance_that_is_stated_is_not_asked_for(tmp_path: Path, fzg: Gearbox) -> None:
+    column = '[columns.T_bearing_2_degC]\nquantity = "T_bearing_2"\nbias_sd = 3.0\n'
+    (tmp_path / "run.toml").write_text(f"schema = 1\n{column}", encoding="utf-8")
+    assert all("bias_sd" not in note for note in notes(tmp_path, fzg, with_thermometer(25.0)))

@@ -227,13 +227,23 @@ def test_every_likely_place_is_told_with_what_the_first_one_does() -> None:
     assert told(both, "Where?") == expected
 
 
+def test_evidence_that_is_hardly_enough_says_probably() -> None:
+    clear = missing_physics()
+    assert told(clear, "Is something missing?").startswith("Yes, in the model: evidence")
+    hardly = replace(clear, kinds={**clear.kinds, "nothing": 0.48})
+    assert told(hardly, "Is something missing?").startswith("Probably, in the model: evidence")
+
+
 def test_a_larger_held_out_error_is_not_called_better() -> None:
     base = missing_physics()
     worse = replace(base, holdout=replace(base.holdout, after=4.0), holdout_gain=93.0, contradicted=True)
     assert "not closer than with the calibrated model: predict with calibrated.toml" in told(worse, "How much better?")
     assert "not closer" not in told(replace(base, holdout_gain=93.0), "How much better?")
     better = told(worse, "How much better?")
+    both = "predict with calibrated.toml; with model error allowed for they are more probable with the correction"
+    assert both in better and "predicted better" not in better
     assert "by 93 nat of log score\nSo the held-out recordings contradict the findings (larger error of" in better
+    assert "more probable" not in told(replace(worse, holdout_gain=-93.0), "How much better?")
     assert "contradict" not in told(base, "How much better?")
     unconfirmed = told(replace(base, holdout_gain=-30.0, contradicted=True), "How much better?")
     assert "predicted worse than by the calibrated model, by 30 nat of log score\nSo" in unconfirmed
