@@ -129,7 +129,7 @@ def dates_with_bands(diagnosis: Diagnosis) -> Chart | None:
         figure.add_scatter(
             x=[moment, moment], y=[next(iter(spans)), list(spans)[-1]], mode="lines",
             line={"color": colour, "width": 2.5, "dash": DASHES[index % len(DASHES)]},
-            name=wrapped(f"begin of {short_title(finding)}"), hovertemplate=f"{date_told(finding)}<extra></extra>",
+            name=wrapped(f"begin of {short_title(finding)}"), hovertemplate=f"{date_told(date)}<extra></extra>",
         )  # fmt: skip
         if date.to_s is not None:
             figure.add_vline(x=(start + date.to_s) / scale, line={"color": colour, "width": 1.5, "dash": "dot"})
@@ -140,7 +140,7 @@ def dates_with_bands(diagnosis: Diagnosis) -> Chart | None:
     return Chart(
         name="dates", title="When it began", figure=figure,
         note="Line: the most probable moment. Shaded: where it lies with 95 %. Dotted: the end.",
-        alt="; ".join(f"{short_title(finding)} {clause(date_told(finding))}" for finding, _ in dated) + ".",
+        alt="; ".join(f"{short_title(finding)} {clause(date_told(date))}" for finding, date in dated) + ".",
     )  # fmt: skip
 
 

@@ -62,6 +62,7 @@ def page(diagnosis: Diagnosis) -> str:
         headline=wording.headline,
         size_of=size_of,
         named=named,
+        date_told=date_told,
         recordings=len({course.recording for course in diagnosis.courses}),
         provenance=wording.provenance(diagnosis.inputs),
     )  # fmt: skip
@@ -101,7 +102,7 @@ def _finding(finding: Finding) -> dict[str, Any]:
         "of": finding,
         "title": wording.plain(finding.title),
         "numbers": wording.plain(values_told(finding)),
-        "date": wording.clause(date_told(finding)),
+        "date": "" if finding.date is None else wording.clause(date_told(finding.date)),
         "mean_heat": numbers.with_error(finding.heat_mean_W, finding.heat_stderr_W),
         "equation": equation.drawn(finding.equation),
         "parameters": [

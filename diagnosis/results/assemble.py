@@ -20,7 +20,7 @@ from diagnosis.forward.grid import too_short
 from diagnosis.forward.whitening import RandomHeat
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.advice import next_test
-from diagnosis.results.findings import estimates_of, finding_of, joint_estimate_of, switch_errors
+from diagnosis.results.findings import change_of, estimates_of, finding_of, joint_estimate_of, switch_errors
 from diagnosis.results.held_out import validate
 from diagnosis.results.instruments import sensors_and_inputs_of
 from diagnosis.results.locations import locations_of
@@ -33,6 +33,7 @@ from diagnosis.results.result_parts import (
     NO_CLAIM,
     Calibrated,
     CalibratedModel,
+    Change,
     Finding,
     NotDetectable,
     Ranked,
@@ -141,7 +142,7 @@ def assemble(
         misfit=_misfit(final),
         remaining_nat=0.0 if _looked_no_further(best) else posterior.left_by(best),
         remaining_note=_remaining(posterior, others, best) + (LEFT_OUT if valid.without_second else ""),
-        ranking=_ranking(posterior),
+        ranking=_ranking(posterior, setup.recordings),
         unseen=unseen,
         not_tried=tuple(sorted(
             setup.catalogue.keys() - {one.effect.name for one in posterior.expected}
@@ -379,7 +380,7 @@ def _calibrated(
     )  # fmt: skip
 
 
-def _ranking(posterior: Posterior) -> tuple[Ranked, ...]:
+def _ranking(posterior: Posterior, recordings: Sequence[Recording]) -> tuple[Ranked, ...]:
     """Everything that was judged, most probable first, then by evidence; of a pair both names."""
     ranked = sorted(posterior.ranked, key=lambda one: (-round(one[1], 4), -one[0].log_bayes))
     return tuple(
@@ -388,7 +389,14 @@ def _ranking(posterior: Posterior) -> tuple[Ranked, ...]:
             place=" + ".join(effect.place for effect in one.effects),
             family=" + ".join(dict.fromkeys(effect.family for effect in one.effects)), log_bayes=one.log_bayes,
             probability=probability,
-            laws=tuple(called(effect.mechanism, effect.place) for effect in one.effects),
+            laws=tuple(called(effect.mechanism, effect.place) for effect in one.effects), date=_date_of(one, recordings),
         )
         for one, probability in ranked[:MOST_RANKED]
     )  # fmt: skip
+
+
+def _date_of(one: Judged, recordings: Sequence[Recording]) -> Change | None:
+    dated = next((effect for effect in one.effects if effect.date is not None), None)
+    if dated is None or one.fit is None:
+        return None
+    return change_of(estimates_of(one.fit), dated, one.fit.experiment, recordings)

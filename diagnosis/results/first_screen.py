@@ -14,6 +14,7 @@ from diagnosis.results.result_parts import (
     MOST_NEAREST,
     NEAREST,
     NO_CLAIM,
+    Change,
     Finding,
     named,
     title_of,
@@ -190,9 +191,11 @@ def _what(d: Diagnosis) -> tuple[str, ...]:
         lines.append(f"{item[0].grade.capitalize()}: {item[0].says} [{title_of(item)}]")
         for finding in item:
             says = "" if finding.says == item[0].says else f"with it: {finding.says}"
-            lines += [f"  {line}" for line in (says, values_told(finding), date_told(finding)) if line]
+            date = "" if finding.date is None else date_told(finding.date)
+            lines += [f"  {line}" for line in (says, values_told(finding), date) if line]
     if d.nearest:
-        told = ", ".join(f"{named(one.mechanism, one.place)} ({one.probability:.2f})" for one in d.nearest)
+        told = ", ".join(f"{named(one.mechanism, one.place)} ({one.probability:.2f}"
+                         f"{f'; {date_told(one.date)}' if one.date else ''})" for one in d.nearest)  # fmt: skip
         lines.append(f"No name is certain enough to be reported; most like: {told}.")
         if d.verdict == "parameter_error":
             lines.append("Several may be off, or the definition lacks a part or a path.")
@@ -356,11 +359,8 @@ def values_told(finding: Finding) -> str:
     return ", ".join(told)
 
 
-def date_told(finding: Finding) -> str:
-    """Date of a finding for a terminal."""
-    date = finding.date
-    if date is None:
-        return ""
+def date_told(date: Change) -> str:
+    """A date for a terminal."""
     band = "" if date.band_s is None else f" ({_time(date.band_s[0])} to {_time(date.band_s[1])})"
     end = "" if date.to_s is None else f", until {_time(date.to_s)}"
     utc = "" if date.utc is None else f", {date.utc[:16].replace('T', ' ')} UTC"

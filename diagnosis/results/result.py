@@ -225,7 +225,7 @@ class Diagnosis:
             },
             "ranking": [
                 {"mechanism": r.mechanism, "place": r.place, "family": r.family, "log_bayes": r.log_bayes,
-                 "probability": r.probability}
+                 "probability": r.probability, "date": None if r.date is None else asdict(r.date)}
                 for r in self.ranking
             ],
             "not_tried": list(self.not_tried),

@@ -404,6 +404,8 @@ class Ranked:
     log_bayes, probability : float
     laws : tuple of str
         Names of its effects, whatever their course in time
+    date : Change or None
+        When its first effect that has a date begins, if it was fitted
     """
 
     mechanism: str
@@ -412,6 +414,7 @@ class Ranked:
     log_bayes: float
     probability: float
     laws: tuple[str, ...]
+    date: Change | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -244,6 +244,7 @@ def test_a_link_that_changes_at_a_date_acts_like(
     assert date.from_s == pytest.approx(DATE_S) and date.to_s == pytest.approx(4200.0)
     assert date.band_s is not None and date.band_s[0] < DATE_S < date.band_s[1]
     assert date.utc == "2020-01-01T08:40:00+00:00"
+    assert [one.date for one in found.ranking] == [date]
     assert {p.name for p in finding.parameters} == {"strength", "since", "lasting"}
     time, heat = finding.heat[RECORDED]
     acts, rests = (np.abs(time - 3300.0) < 800.0), (np.abs(time - 3300.0) > 1300.0)

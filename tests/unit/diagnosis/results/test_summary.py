@@ -163,6 +163,12 @@ def test_what_is_nearest_to_something_without_a_name_is_told() -> None:
     reported = "most like: unknown_loss at mesh (0.65), unknown_heat at mesh (0.33)."
     assert reported in told(nameless, "What?")
     assert "<b>Most like:</b> unknown loss at mesh (0.65)" in page(nameless)
+    begun = Change(recording="train_1", from_s=20634.0, band_s=(20100.0, 21100.0))
+    dated = replace(nameless, ranking=(replace(ranking[0], date=begun), *ranking[1:]))
+    since = "(0.65; from 5.73 h of train_1 on (5.58 h to 5.86 h))"
+    assert f"unknown_loss at mesh {since}, unknown_heat at" in told(dated, "What?")
+    assert f"unknown loss at mesh {since}, " in page(dated)
+    assert dated.to_dict()["ranking"][0]["date"]["from_s"] == 20634.0
     for other in (unexplained(), replace(consistent(), ranking=ranking)):
         assert other.nearest == () and "most like" not in str(other) and "<b>Most like" not in page(other)
 
