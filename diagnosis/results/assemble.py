@@ -388,8 +388,8 @@ def _ranking(posterior: Posterior, recordings: Sequence[Recording]) -> tuple[Ran
             mechanism=" + ".join(effect.name for effect in one.effects),
             place=" + ".join(effect.place for effect in one.effects),
             family=" + ".join(dict.fromkeys(effect.family for effect in one.effects)), log_bayes=one.log_bayes,
-            probability=probability,
-            laws=tuple(called(effect.mechanism, effect.place) for effect in one.effects), date=_date_of(one, recordings),
+            probability=probability, date=_date_of(one, recordings),
+            laws=tuple(called(effect.mechanism, effect.place) for effect in one.effects),
         )
         for one, probability in ranked[:MOST_RANKED]
     )  # fmt: skip
