@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from itertools import product
 
 import numpy as np
 
@@ -17,8 +16,8 @@ from diagnosis.engine.unknown import TERM_STEP, Held, NetworkParameter, TermPara
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from models.base.types import Array
 
-START_SHARES = (1.0, 0.1)  # of the strength that the scan promises
-SWITCH_SHARES = (0.5, 1.0, 2.0)  # of the same, all of them, for what switches: its objective has many minima
+START_SHARES = (1.0, 0.1)  # of the strength that the scan promises: until one brings something
+SWITCH_SHARES = (1.0, 0.5, 2.0)  # of the same for what switches, as long as they do: its objective has many minima
 ROUGH, ITERATIONS = 3, 10
 FAR_NAT = 20.0  # that a fit would gain by a further step: it is far from its optimum
 DATE_STEP_S = 10.0
@@ -33,8 +32,8 @@ def refit(
     The other unknowns start where the straight line puts them with the candidate there. What it does may be far from
     a straight line; so smaller shares of the promised strength are tried until a rough fit agrees better with the
     readings than without the candidate, and all further starts. The best rough fit goes on. What switches starts where
-    finer scans put its numbers, with several shares of the strength, and from the fit as it is too; the numbers stay
-    there while everything else is far from where it belongs.
+    finer scans put its numbers, with several shares of the strength as long as they bring something, and from the fit
+    as it is too; the numbers stay there while everything else is far from where it belongs.
 
     Raises
     ------
@@ -61,13 +60,13 @@ def refit(
             return []
 
     rough: list[Fit] = []
-    if held:
-        for base, share in product(bases, SWITCH_SHARES):
-            rough += rough_fit(variant, share * strength, base)
-    for share in START_SHARES:
-        if any(one.objective < fit.objective for one in rough):
-            break
-        rough += rough_fit(variant, share * strength)
+    for base in bases if held else bases[:1]:
+        for share in SWITCH_SHARES if held else START_SHARES:
+            found = rough_fit(variant, share * strength, base)
+            rough += found
+            better = any(one.objective < fit.objective for one in found)
+            if found and better != bool(held):
+                break
     for other, size in further:
         rough += rough_fit(other, size)
     if not rough:

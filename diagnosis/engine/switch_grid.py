@@ -146,7 +146,10 @@ def finer_scans(
         found = scan(fit, [replace(candidate, variants=np.array(variants)), before])
         candidate = replace(candidate, variants=np.array([variants[found.best[0]]]))
         strength = float(found.singles(found.gram.given([*found.unknowns, *found.further])).value[0])
-        gain = float(found.log_bayes[0] + found.spread[0] - found.log_bayes[1])
+        promised = float(found.log_bayes[0] + found.spread[0])
+        gain = promised - float(found.log_bayes[1])
+        if promised <= 0.0:
+            break  # a finer grid brings nothing either
     return candidate, strength, gain
 
 
