@@ -58,10 +58,16 @@ def part_colours(parts: Iterable[str]) -> dict[str, str]:
     >>> colours = part_colours(["oil", "bearing_1", "bearing_2", "T_belt"])
     >>> colours["oil"], colours["bearing_1"] != colours["bearing_2"]
     ('#E69F00', True)
+    >>> list(part_colours(["L1", "L2"]).values())
+    ['#0072B2', '#D55E00']
     """
+    every = list(parts)
+    # As long as there are hues, parts of unknown families have one each: L1 to L4 are not four shades of one.
+    few = sum(_family(part) not in HUES for part in every) <= len(OTHER_HUES)
     families: dict[str, list[str]] = {}
-    for part in parts:
-        families.setdefault(_family(part), []).append(part)
+    for part in every:
+        family = _family(part)
+        families.setdefault(part if few and family not in HUES else family, []).append(part)
     others = [family for family in families if family not in HUES]
     hues = {**HUES, **{family: OTHER_HUES[i % len(OTHER_HUES)] for i, family in enumerate(others)}}
     return {
