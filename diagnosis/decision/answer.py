@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from operator import attrgetter
 from typing import Literal
 
 import numpy as np
@@ -16,6 +17,7 @@ from models.terms.term import Term
 
 Grade = Literal["claim", "likely"]
 MOST_TIED = 3
+WEIGHT = attrgetter("weight")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -89,7 +91,8 @@ def _best_fitted(posterior: Posterior) -> Judged:
     """The most probable explanation; if it has no fit, the one with its names whose fit has the most evidence.
 
     Far from a straight line the refit of the best place may fail, and that of another one end without the effect. A fit
-    at the same place goes before others.
+    at the same place goes before others. A heat that is like no law is never fitted: a law with more evidence that acts
+    on the same part, or on its thermometer, goes before it.
     """
     explanation = next(
         one for one in posterior.explanations if one.members[0].of_parameters == posterior.parameter_outside
@@ -97,10 +100,16 @@ def _best_fitted(posterior: Posterior) -> Judged:
     first = explanation.members[0]
     if first.fit is not None:
         return first
+    if first.effects[0].is_open:
+        there = _changed(first.effects[0].added)
+        singles = [one for one in posterior.judged if len(one.effects) == 1 and one.effects[0].term is not None]
+        known = [one for one in singles if one.fit is not None and one.weight > first.weight
+                 and not there.isdisjoint(_changed(one.effects[0].added))]  # fmt: skip
+        return max(known, key=WEIGHT, default=first)
     fitted = [one for one in posterior.judged if one.fit is not None and set(explanation.names) <= set(one.names)]
     labels = {effect.label for effect in first.effects}
-    there = [one for one in fitted if labels <= {effect.label for effect in one.effects}]
-    return max(there or fitted, key=lambda one: one.weight, default=first)
+    same = [one for one in fitted if labels <= {effect.label for effect in one.effects}]
+    return max(same or fitted, key=WEIGHT, default=first)
 
 
 def _answer(posterior: Posterior, best: Judged, effect: Hypothesis) -> Answer | None:

@@ -13,12 +13,12 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from operator import attrgetter
 
 import numpy as np
 from scipy.special import log_ndtr
 
 from diagnosis.candidates.hypotheses import Hypothesis
+from diagnosis.decision.answer import WEIGHT
 from diagnosis.decision.placebo import CandidatesIn, judge_baselines
 from diagnosis.decision.posterior import Assumed, Judged, Posterior
 from diagnosis.decision.scanned import (
@@ -46,7 +46,6 @@ from diagnosis.engine.switch_grid import held_numbers, switch_numbers, with_refi
 from models.base.progress import Progress, silent
 
 StartOf = Callable[[ErrorClass], Fit]  # where fits with model error of a class begin
-WEIGHT = attrgetter("weight")
 RACED, PLACES, RACE_STEPS = 18, 2, 4
 NEAR_PLACE = 3.0  # nats behind the best place of its name, up to which a second place is raced
 REFITTED, SECONDS = 6, 2

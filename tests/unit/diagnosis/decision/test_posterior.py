@@ -389,6 +389,20 @@ def test_an_unknown_heat_is_never_a_claim() -> None:
     assert answer.probability > ENOUGH and (answer.grade, answer.acts_like) == ("likely", True)
 
 
+def test_a_law_with_more_evidence_goes_before_a_heat_like_no_law_there() -> None:
+    """A thermometer that drifts looks like any heat into its own small part, and can be fitted."""
+    heat = judged(STRONG, effect("unknown_heat", "bearing_1", family=OPEN_FORM, log_prior=0.0))
+    drift = judged(STRONG + 9.0, effect("sensor_drift", "bearing_1", kind="sensor"))
+    for where, weaker, led in (("bearing_1", 0.0, "sensor_drift"), ("bearing_1", 9.0, "unknown_heat"),
+                               ("bearing_2", 0.0, "unknown_heat")):  # fmt: skip
+        known = judged(drift.log_bayes - weaker, effect("sensor_drift", where, kind="sensor"))
+        found = posterior(heat, replace(known, fit=cast(Fit, object())), settings=Settings(odds_unknown=10.0))
+        assert found.explanations[0].names == ("unknown_heat",)
+        (answer,) = decide(found)
+        assert answer.effect.name == led and answer.joint > ENOUGH
+        assert led == "unknown_heat" or [one.name for one, _ in answer.tied] == ["sensor_drift", "unknown_heat"]
+
+
 def test_certainty_is_never_above_one() -> None:
     many = [judged(STRONG, effect("fan", place=str(i))) for i in range(50)]
     found = posterior(*many)

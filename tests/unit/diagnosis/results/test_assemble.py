@@ -16,6 +16,7 @@ from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.families import candidates_of
 from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.learnt import error_classes, rule
+from diagnosis.engine.outside import outside_of
 from diagnosis.engine.refit import with_candidate
 from diagnosis.engine.unknown import NetworkParameter
 from diagnosis.forward.whitening import RandomHeat
@@ -257,6 +258,17 @@ def test_a_link_that_changes_at_a_date_acts_like(
     assert read_answer(found.to_dict(), fzg).claims[0].what == "link"
     assert correction_of(replace(found, terms=(effect.term,)), fzg).findings[0].term.label == effect.term.label
     assert "strength" not in finding.equation and "since" not in finding.equation
+
+
+def test_a_heat_like_no_law_has_no_numbers(assembled: Assemble, prepared: Prepared) -> None:
+    setup, experiment, plain = prepared
+    heat = next(one for one in outside_of(setup, experiment) if one.place == "oil")
+    judged = Judged(effects=(heat,), log_bayes=60.0, error_class=error_classes()[0])
+    answer = Answer(best=judged, effect=heat, grade="likely", probability=0.97, joint=0.97, acts_like=True)
+    found = assembled(posterior_of(plain, judged), [answer])
+    (finding,) = found.findings
+    assert (finding.parameters, finding.equation, finding.heat_mean_W) == ((), "", 0.0)
+    assert "like no law of the catalogue" in str(found) and "strength" not in str(found)
 
 
 def test_the_band_of_a_date_ends_where_the_recordings_do(prepared: Prepared) -> None:
