@@ -26,6 +26,8 @@ def recurrence(slope: Array, driven: Array) -> Array:
     >>> recurrence(np.array([[0.0], [0.5], [1.0], [0.0]]), np.array([[8.0], [1.0], [0.0], [2.0]]))[:, 0]
     array([8., 5., 5., 2.])
     """
+    if not driven.size:
+        return driven  # without a column LAPACK, as scipy calls it, writes where there is nothing
     band = np.ones((2, len(driven)), order="F")  # the diagonal, and below it what one row takes from the row before
     if slope.shape[1] == 1:
         band[1, :-1] = -slope[1:, 0]

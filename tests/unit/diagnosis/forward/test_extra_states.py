@@ -53,6 +53,15 @@ def test_recurrence_is_a_loop() -> None:
     for k in range(1, len(driven)):
         expected[k] += slope[k] * expected[k - 1]
     np.testing.assert_allclose(recurrence(slope, driven), expected, rtol=1e-12, atol=1e-12)
+    one, shared = recurrence(slope[:, :1], driven), np.broadcast_to(slope[:, :1], slope.shape)
+    np.testing.assert_array_equal(one, recurrence(shared, driven))
+
+
+def test_no_columns_are_not_given_to_lapack(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Scipy's `dtbtrs` writes beyond an array without columns; a class without model error has none."""
+    monkeypatch.setattr("diagnosis.forward.recurrence.dtbtrs", None)
+    assert recurrence(np.zeros((10, 1)), np.zeros((10, 0))).shape == (10, 0)
+    assert lagged(np.zeros((11, 0)), np.ones(10), 5.0).shape == (11, 0)
 
 
 def test_a_lag_follows_its_equation() -> None:
