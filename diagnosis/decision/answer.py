@@ -107,9 +107,10 @@ def _best_fitted(posterior: Posterior) -> Judged:
                  and not there.isdisjoint(_changed(one.effects[0].added))]  # fmt: skip
         return max(known, key=WEIGHT, default=first)
     fitted = [one for one in posterior.judged if one.fit is not None and set(explanation.names) <= set(one.names)]
+    alone = [one for one in fitted if one.names == explanation.names]  # a further effect is not an answer by itself
     labels = {effect.label for effect in first.effects}
     same = [one for one in fitted if labels <= {effect.label for effect in one.effects}]
-    return max(same or fitted, key=WEIGHT, default=first)
+    return max(same or alone or fitted, key=WEIGHT, default=first)
 
 
 def _answer(posterior: Posterior, best: Judged, effect: Hypothesis) -> Answer | None:

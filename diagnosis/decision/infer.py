@@ -10,7 +10,7 @@ effects and model error are too much alike.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -109,8 +109,7 @@ def infer(
             alone |= {label: min(alone[label], value) for label, value in there.items()}
         progress("fitting the machine without an effect from there")
         gained, elsewhere = _nothing_gains(calibration, best)
-    for index, candidate in enumerate(first.candidates):
-        judged.setdefault(candidate.label, _by_scan(first, index, alone[candidate.label]))
+    judged |= _left_to_the_scan(judged, first, alone)
     every = (*judged.values(), *pairs)
     parameters = [one.weight for one in every if one.of_parameters]
     effects = [one.weight for one in every if sum(effect.term is not None for effect in one.effects) == 1]
@@ -145,6 +144,21 @@ def infer(
         # Where channels were set apart the others chose the basin: a broken one is not to draw the machine elsewhere.
         elsewhere=elsewhere if gained > FAR_BETTER and calibration.of_others is None else None,
     )
+
+
+def _left_to_the_scan(
+    judged: Mapping[str, Judged], first: Scanned, alone: Mapping[str, float]
+) -> dict[str, Judged]:  # fmt: skip
+    """What was not fitted: what a fit takes from a law at one place, it would take at the others too."""
+    taken: dict[str, float] = {}
+    for one, scanned in zip(first.candidates, first.log_bayes.tolist(), strict=True):
+        here = judged.get(one.label)
+        if here is not None and here.fit is not None and one.how == "always":
+            taken[one.law] = min(taken.get(one.law, np.inf), max(scanned - here.log_bayes, 0.0))
+    return {
+        one.label: _by_scan(first, index, alone[one.label] - (taken.get(one.law, 0.0) if one.how == "always" else 0.0))
+        for index, one in enumerate(first.candidates) if one.label not in judged or judged[one.label].fit is None
+    }  # fmt: skip
 
 
 def _raced(

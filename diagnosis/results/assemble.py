@@ -119,7 +119,7 @@ def assemble(
     believed = (most_probable.fit if most_probable else None) or calibration.fit
     runs = valid.model.predicted.train
     effects = valid.model.best.effects if valid.model.best else ()
-    model = _calibrated(final, runs["after"], believed, plain, inputs, effects)
+    model = _calibrated(final, (runs["after"], runs["before"]), believed, plain, inputs, effects)
     return Diagnosis(
         verdict=verdict,
         gearbox=setup.gearbox.name,
@@ -134,7 +134,7 @@ def assemble(
         faulty=faulty,
         terms=_terms(valid.model.best, final),
         known=known,
-        alone=_calibrated(plain, runs["calibrated"], calibration.fit, plain, inputs),
+        alone=_calibrated(plain, (runs["calibrated"], runs["before"]), calibration.fit, plain, inputs),
         joint=joint_estimate_of(final),
         starts_at=experiment.starts_at,
         noise_K=setup.noise_K,
@@ -348,8 +348,8 @@ def _courses(setup: InferenceSetup, predicted: Predicted) -> tuple[PredictedRun,
 
 
 def _calibrated(
-    fit: Fit, run: Sequence[Prediction], believed: Fit, plain: Fit, inputs: Collection[str],
-    effects: Sequence[Hypothesis] = (),
+    fit: Fit, runs: tuple[Sequence[Prediction], Sequence[Prediction]], believed: Fit, plain: Fit,
+    inputs: Collection[str], effects: Sequence[Hypothesis] = (),
 ) -> CalibratedModel:  # fmt: skip
     """Every usual parameter, the sensors and the inputs of a fit, without those of effects.
 
@@ -357,8 +357,8 @@ def _calibrated(
 
     Parameters
     ----------
-    run : sequence of Prediction
-        Of the recordings that were learnt from
+    runs : (sequence of Prediction, sequence of Prediction)
+        Of the recordings that were learnt from, by it and by the machine as delivered
     believed : Fit
         With model error in place; what it does not have is as in `fit`
     """
@@ -376,7 +376,7 @@ def _calibrated(
                        estimate_stderr=sd, shift_in_sd=stated[p.name].z_of(estimate), unit=p.unit)
             for p in usual for (value, stderr), (estimate, sd) in [(values[p.name], estimates[p.name])]
         ),
-        sensors=sensors, true_inputs=true_inputs, mean_loss=mean_loss_of(believed, fit, run),
+        sensors=sensors, true_inputs=true_inputs, mean_loss=mean_loss_of(believed, fit, *runs),
     )  # fmt: skip
 
 

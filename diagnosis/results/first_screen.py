@@ -276,10 +276,14 @@ def _how_much_better(d: Diagnosis) -> tuple[str, ...]:
         apart = (
             ": more than its error, so take no losses from that model; temperatures alone give ratios of heats, and a "
             "measured loss would settle it"
-        ) if loss.is_far else ""  # fmt: skip
+        ) if loss.is_far else (
+            ". Without a measured loss watts rest on the heat capacities of the definition: a mass that it lacks, as a "
+            "bed or a frame, makes them too few"
+        ) if loss.moved else ""  # fmt: skip
         lines.append(
             f"Mean total loss, not measured: {with_error(loss.estimate_W, loss.stderr_W)} W estimated, "
-            f"{number(loss.predicting_W)} W in the model that predicts{apart}"
+            f"{number(loss.delivered_W)} W as delivered, {number(loss.predicting_W)} W in the model that predicts"
+            f"{apart}"
         )
     if math.isfinite(d.left_out_K):
         lines.append(

@@ -12,7 +12,9 @@ import pytest
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision import answer as answer_module
 from diagnosis.decision.answer import Answer, decide, withdraw_claim
+from diagnosis.decision.infer import _left_to_the_scan
 from diagnosis.decision.posterior import KINDS, Judged, Likeness, Posterior
+from diagnosis.decision.scanned import Scanned
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.fit import Fit
 from diagnosis.engine.learnt import ErrorClass, error_classes, rule
@@ -401,6 +403,25 @@ def test_a_law_with_more_evidence_goes_before_a_heat_like_no_law_there() -> None
         (answer,) = decide(found)
         assert answer.effect.name == led and answer.joint > ENOUGH
         assert led == "unknown_heat" or [one.name for one, _ in answer.tied] == ["sensor_drift", "unknown_heat"]
+
+
+def test_what_a_fit_takes_from_a_law_it_takes_at_its_other_places_too() -> None:
+    """Else a place that was not fitted would go before the best one, which was."""
+    sun, other = [effect("sun", place) for place in ("cover", "base", "wall")], effect("fan", "base")
+    every = (*sun, other)
+    here = SimpleNamespace(scan=SimpleNamespace(best=[0] * 4), error_class=error_classes()[0])
+    first = cast(
+        Scanned, SimpleNamespace(candidates=every, log_bayes=np.array([60.0, 58.0, 20.0, 30.0]), best=[here] * 4)
+    )
+    alone = {one.label: float(value) for one, value in zip(every, first.log_bayes, strict=True)}
+    fitted = replace(judged(52.0, sun[0]), fit=cast(Fit, object()))
+    failed = judged(20.0, sun[2])
+    found = _left_to_the_scan({sun[0].label: fitted, sun[2].label: failed}, first, alone)
+    assert {label: one.log_bayes for label, one in found.items()} == {
+        "sun@base": 50.0, "sun@wall": 12.0, "fan@base": 30.0
+    }  # fmt: skip
+    better = replace(fitted, log_bayes=90.0)  # what a fit gains is of its place alone
+    assert _left_to_the_scan({sun[0].label: better}, first, alone)["sun@base"].log_bayes == 58.0
 
 
 def test_certainty_is_never_above_one() -> None:

@@ -20,11 +20,13 @@ def test_mean_loss_of_temperatures_alone(fzg: Gearbox) -> None:
     made = recorded(fzg, "made")
     fit = calibrate(prepare_experiment(fzg, [made], [made])[1])
     run = [predict(fit.experiment, index, fit.z) for index in range(len(fit.parts))]
-    found = mean_loss_of(fit, fit, run)
+    delivered = [predict(fit.experiment, index, None) for index in range(len(fit.parts))]
+    found = mean_loss_of(fit, fit, run, delivered)
     assert found is not None and found.predicting_W == pytest.approx(found.estimate_W, rel=0.01)
     driven = fzg.network().simulate(made.cycle, losses=fzg.losses(), initial=22.0)
     true_W = float(np.mean(driven.columns()["P_loss_W"]))
     assert abs(found.estimate_W - true_W) < 2.0 * found.stderr_W < 0.3 * true_W
+    assert found.delivered_W == pytest.approx(true_W, rel=0.02) and not found.moved
     names = [unknown.parameter.name for unknown in fit.experiment.unknowns]
     mesh, loss = names.index("mesh"), mean_loss(fit)
     moved = fit.z.copy()
@@ -34,4 +36,4 @@ def test_mean_loss_of_temperatures_alone(fzg: Gearbox) -> None:
 
 
 def test_a_measured_loss_needs_no_estimate(prepared: Prepared) -> None:
-    assert mean_loss_of(prepared[2], prepared[2], []) is None
+    assert mean_loss_of(prepared[2], prepared[2], [], []) is None

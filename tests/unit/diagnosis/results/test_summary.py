@@ -212,13 +212,17 @@ def test_parameters_far_from_their_priors_are_told_the_farthest_first() -> None:
 
 
 def test_a_loss_that_is_not_measured_is_given_with_its_error_and_with_what_predicts() -> None:
-    loss = MeanLoss(estimate_W=449.0, stderr_W=29.0, predicting_W=462.0)
+    loss = MeanLoss(estimate_W=449.0, stderr_W=29.0, predicting_W=462.0, delivered_W=480.0)
     usual = replace(missing_physics(), model=CalibratedModel(mean_loss=loss))
-    line = "Mean total loss, not measured: 449 ± 29 W estimated, 462 W in the model that predicts"
+    line = "Mean total loss, not measured: 449 ± 29 W estimated, 480 W as delivered, 462 W in the model that predicts"
     assert line in told(usual, "How much better?").splitlines()
-    assert usual.to_dict()["mean_loss"] == {"estimate_W": 449.0, "stderr_W": 29.0, "predicting_W": 462.0}
+    assert usual.to_dict()["mean_loss"] == {
+        "estimate_W": 449.0, "stderr_W": 29.0, "predicting_W": 462.0, "delivered_W": 480.0
+    }  # fmt: skip
     far = replace(usual, model=CalibratedModel(mean_loss=replace(loss, predicting_W=508.0)))
     assert "508 W in the model that predicts: more than its error" in told(far, "How much better?")
+    moved = replace(usual, model=CalibratedModel(mean_loss=replace(loss, delivered_W=600.0)))
+    assert "predicts. Without a measured loss watts rest on the heat capacities" in told(moved, "How much better?")
     assert "Mean total loss" not in str(missing_physics()) and missing_physics().to_dict()["mean_loss"] is None
 
 
