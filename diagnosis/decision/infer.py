@@ -149,7 +149,7 @@ def infer(
 def _left_to_the_scan(
     judged: Mapping[str, Judged], first: Scanned, alone: Mapping[str, float]
 ) -> dict[str, Judged]:  # fmt: skip
-    """What was not fitted: what a fit takes from a law at one place, it would take at the others too."""
+    """Candidates without a fit: evidence that a fit takes from a law at one place is not left at the others either."""
     taken: dict[str, float] = {}
     for one, scanned in zip(first.candidates, first.log_bayes.tolist(), strict=True):
         here = judged.get(one.label)

@@ -71,9 +71,10 @@ def mean_loss_of(
     is_loss = fit.experiment.machine.model.is_loss
 
     def mean_over(runs: Sequence[Prediction]) -> float:
-        """Of the losses that both machines have: those of findings come last."""
+        """Mean loss of a machine."""
         tested = [runs[index] for index in experiment.tested]
         heat = [one.trajectory.balance.sources for one in tested]
+        # Further sources of the machine with findings come last.
         loss = np.concatenate([each[:, is_loss[: each.shape[1]]].sum(axis=-1) for each in heat])
         return float(np.average(loss, weights=np.concatenate([one.piece.steps for one in tested])))
 
