@@ -262,7 +262,7 @@ def clock_of(table: pd.DataFrame, units: Mapping[str, str]) -> Clock:
     known = units_in_files("time", "s")
     with_unit = {name: unit_of_name(name, "time", "time", "s") or units.get(name, "") for name in columns}
     for name in columns:
-        if name.lower() in ISO_NAMES and holds_dates(table[name]):
+        if name.lower() in ISO_NAMES and (table.empty or holds_dates(table[name])):  # without rows that is the fault
             return Clock(column=name, unit=ISO)
         is_time = name.lower() in ISO_NAMES or unit_of_name(name, "time", "time", "s") is not None
         if is_time and with_unit[name] in known:

@@ -109,6 +109,7 @@ FILES: list[tuple[str | bytes, tuple[str, ...]]] = [
     (with_column("time_s", W / 3.6e5), ("hours or days meant",)),
     (text(lambda t: t.rename(columns={"time_s": "time"})), ("column time is no ISO 8601",)),
     (text(lambda t: t[:0]), ("has no rows",)),
+    (text(lambda t: t[:0].rename(columns={"time_s": "time"})), ("has no rows",)),
     (text(lambda t: t[:2]), ("has 2 rows",)),
     (dated(lambda s: [*s[:30], "29.10.2017 00:05", *s[31:]]), ("time_utc", "row 31", "ISO 8601")),
     (dated(lambda s: [*s[:30], *(t.removesuffix("Z") for t in s[30:])]), ("time zone", "rows 1 and 31")),
