@@ -48,6 +48,7 @@ MOST_UNSEEN = 6  # effects that the summary names of those that cannot be seen
 OF_DATE = ("since", "lasting")  # parameters that the date contains
 OF_SWITCH = ("set_point", "band")  # parameters that the switching temperatures contain
 LONG_S = 7200.0  # times beyond are told in hours
+FAR_SD = 2.0  # standard errors from an estimate, beyond which the number that predicts is told too
 LITTLE_SPREAD = 0.05  # deviation between sessions that is not worth a word, in prior standard deviations
 
 
@@ -192,7 +193,8 @@ def _what(d: Diagnosis) -> tuple[str, ...]:
         for finding in item:
             says = "" if finding.says == item[0].says else f"with it: {finding.says}"
             date = "" if finding.date is None else date_told(finding.date)
-            lines += [f"  {line}" for line in (says, values_told(finding), date) if line]
+            numbers = (values_told(finding), date, predicting_told(d, finding))
+            lines += [f"  {line}" for line in (says, *numbers) if line]
     if d.nearest:
         told = ", ".join(f"{named(one.mechanism, one.place)} ({one.probability:.2f}"
                          f"{f'; {date_told(one.date)}' if one.date else ''})" for one in d.nearest)  # fmt: skip
@@ -361,6 +363,18 @@ def values_told(finding: Finding) -> str:
     if finding.switching is not None:
         told.append(f"on at {finding.switching.on_degC:.1f} degC, off at {finding.switching.off_degC:.1f} degC")
     return ", ".join(told)
+
+
+def predicting_told(d: Diagnosis, finding: Finding) -> str:
+    """Numbers of a finding that are far from the estimate in the model that predicts, and so in the FMU."""
+    term = next((one for one in d.terms if finding.term is not None and one.label == finding.term.label), None)
+    if term is None:
+        return ""
+    there = {p.name.removeprefix(f"{term.label}_"): p.start for p in term.parameters}
+    both = [(p, there[p.name]) for p in finding.parameters if p.name in there]
+    told = [f"{p.name} = {number(value)}{_unit(p.unit)}" for p, value in both
+            if 0.0 < FAR_SD * p.stderr < abs(value - p.value)]  # fmt: skip
+    return f"in the model that predicts (correction.toml): {', '.join(told)}" if told else ""
 
 
 def date_told(date: Change) -> str:

@@ -12,8 +12,9 @@ from diagnosis.decision.posterior import Assumed, Placebo, ScaledError
 from diagnosis.decision.settings import Settings
 from diagnosis.report import finding_charts
 from diagnosis.report.page import page
-from diagnosis.results.first_screen import EITHER, VERDICT_TEXT
+from diagnosis.results.first_screen import EITHER, VERDICT_TEXT, predicting_told
 from diagnosis.results.mean_loss import MeanLoss
+from diagnosis.results.number_format import number
 from diagnosis.results.result import Diagnosis
 from diagnosis.results.result_parts import CalibratedModel, Change, Errors, Fits, Ranked, Rival, Switching
 from tests.unit.diagnosis.diagnosis_example import (
@@ -138,6 +139,21 @@ def test_dates_and_switches() -> None:
     assert stored["date"] == {"recording": "train_1", "from_s": 20634.0, "band_s": [20100.0, 21100.0], "to_s": None,
                               "utc": None}  # fmt: skip
     assert stored["switching"] == {"on_degC": 73.0, "off_degC": 67.0}
+
+
+def test_numbers_that_are_others_in_the_model_that_predicts_are_told() -> None:
+    base = missing_physics()
+    (finding,) = base.findings
+    assert finding.term is not None
+    name, first = finding.term.strength.name, replace(finding.parameters[0], name="strength")
+    finding = replace(finding, parameters=(first,))
+    assert first.stderr > 0.0
+    far = first.value + 2.5 * first.stderr
+    near, there = (finding.term.with_values({name: first.value + times * first.stderr}) for times in (1.5, 2.5))
+    assert predicting_told(replace(base, terms=(near,)), finding) == ""
+    line = f"in the model that predicts (correction.toml): strength = {number(far)} {first.unit}"
+    assert line in told(replace(base, terms=(there,), findings=(finding,)), "What?")
+    assert "in the model that predicts" not in str(base)
 
 
 def test_a_tie_of_measurement_and_machine_is_told_as_either() -> None:
