@@ -178,9 +178,9 @@ def _raced(
         one = one if one.fit is None else _judged(calibration, one, _spread(found, index))
         judged[label] = max(judged.get(label, one), one, key=lambda one: (one.fit is not None, one.weight))
     ahead = sorted(judged.values(), key=WEIGHT, reverse=True)[:REFITTED]
-    ahead = [one for one in ahead if one.weight > 0.0] or ahead[:1]  # else a few nats more change nothing
-    for step, one in enumerate(ahead):
-        progress(f"fitting {one.label} to the end", step, len(ahead))
+    able = [one for one in ahead if one.weight > 0.0] or ahead[:1]  # to others a few nats more change nothing
+    for step, one in enumerate(able):
+        progress(f"fitting {one.label} to the end", step, len(able))
         if one.fit is not None:
             judged[one.label] = _fitted_on(calibration, one)
     best = max((judged[one.label] for one in ahead), key=WEIGHT, default=None)

@@ -371,7 +371,7 @@ def predicting_told(d: Diagnosis, finding: Finding) -> str:
     if term is None:
         return ""
     there = {p.name.removeprefix(f"{term.label}_"): p.start for p in term.parameters}
-    both = [(p, there[p.name]) for p in finding.parameters if p.name in there]
+    both = [(p, there[p.name]) for p in finding.parameters if p.name in there and p.name not in OF_DATE]
     told = [f"{p.name} = {number(value)}{_unit(p.unit)}" for p, value in both
             if 0.0 < FAR_SD * p.stderr < abs(value - p.value)]  # fmt: skip
     return f"in the model that predicts (correction.toml): {', '.join(told)}" if told else ""

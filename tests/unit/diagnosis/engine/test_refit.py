@@ -154,6 +154,7 @@ def test_what_switches_starts_from_several_strengths(
     experiment: Experiment, scale: Scale, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     placed, _, base = with_fan(experiment, scale)
+    without = calibrate(experiment)
     starts, fit = list[float](), Experiment.fit
 
     def noted(own: Experiment, z: Array, *given: Any, iterations: int, **options: Any) -> Fit:
@@ -163,4 +164,7 @@ def test_what_switches_starts_from_several_strengths(
 
     monkeypatch.setattr(Experiment, "fit", noted)
     found_with(base, placed)
-    assert np.array(starts[:3]) / starts[1] == pytest.approx(SWITCH_SHARES) and len(starts) >= 3
+    assert np.array(starts[:3]) / starts[0] == pytest.approx(SWITCH_SHARES) and len(starts) >= 3
+    starts.clear()
+    found_with(without, placed)  # a machine without it: other sizes bring nothing either
+    assert len(starts) == 1
