@@ -424,6 +424,15 @@ def test_what_a_fit_takes_from_a_law_it_takes_at_its_other_places_too() -> None:
     assert _left_to_the_scan({sun[0].label: better}, first, alone)["sun@base"].log_bayes == 58.0
 
 
+def test_a_name_without_a_fit_at_its_best_place_is_answered_by_its_own_fit_and_not_by_a_pair() -> None:
+    base, cover = (effect("sun", place) for place in ("base", "cover"))
+    fit = cast(Fit, object())
+    single = replace(judged(STRONG - 5.0, cover), fit=fit)
+    pair = replace(judged(STRONG + 10.0, cover, effect("fan", "base")), fit=fit)
+    (answer,) = decide(posterior(judged(STRONG, base), single, pair))
+    assert answer.best is single and answer.effect is cover
+
+
 def test_certainty_is_never_above_one() -> None:
     many = [judged(STRONG, effect("fan", place=str(i))) for i in range(50)]
     found = posterior(*many)
