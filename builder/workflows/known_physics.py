@@ -9,6 +9,7 @@ from models.base.errors import InputError, did_you_mean
 from models.correction.correction import Finding
 from models.mechanisms import CATALOGUE, Placed, Scale
 from models.network.laws import Parameter
+from models.quantities.units import behind_a_number
 from models.simulation.thermal_network import ThermalNetwork
 
 Given = tuple[float, float]  # value and standard error
@@ -45,8 +46,8 @@ def known_finding(
             raise InputError(f"{name} has no parameter {key!r}{did_you_mean(key, own)}; it has {', '.join(own)}")
         p = own[key]
         if not p.lower <= value <= p.upper:
-            unit = "" if p.unit == "1" else f" {p.unit}"
-            raise InputError(f"{key} = {value:g} is outside {p.lower:.4g} to {p.upper:.4g}{unit} of {name}")
+            limits = f"{p.lower:.4g} to {p.upper:.4g}{behind_a_number(p.unit)}"
+            raise InputError(f"{key} = {value:g} is outside {limits} of {name}")
     strength = term.strength
     if _local(term, strength) not in given:
         raise InputError(f"the strength of {name} is missing: {strength.description or 'its size'} [{strength.unit}], "

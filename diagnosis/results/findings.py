@@ -38,12 +38,11 @@ Values = Mapping[str, tuple[float, float]]
 
 
 def finding_of(answer: Answer, fit: Fit, setup: InferenceSetup, posterior: Posterior) -> Finding:
-    """An answer with the numbers of a fit; of an effect that was not fitted, a heat like no law, without numbers."""
+    """An answer with the numbers of a fit that has its effect; a heat like no law is never fitted and has none."""
     effect, term = answer.effect, answer.effect.term
     values, heats = values_of(fit, effect), heats_of(fit, effect)
     pieces = [part.point.trajectory.piece for part in fit.parts]
     mean, stderr = mean_heat_of(fit, effect)
-    fitted = not effect.is_open or answer.best.fit is not None
     found = {name: value for name, (value, _) in values.items()}
     units = {p.name: p.unit for p in (setup.nominal.parameters if term is None else term.parameters)}
     prefix = "" if term is None else f"{term.label}_"
@@ -56,12 +55,12 @@ def finding_of(answer: Answer, fit: Fit, setup: InferenceSetup, posterior: Poste
         kind="parameter" if term is None else "sensor" if term.of_measurement else term.kind,
         says=_says(answer, found, {p.name: p.start for p in setup.nominal.parameters if p.name in of_heats}),
         reference=term.mechanism.reference if isinstance(term, Placed) else "",
-        equation=_equation(effect, found) if fitted else "",
+        equation="" if effect.is_open else _equation(effect, found),
         probability=answer.probability,
         log_bayes=answer.best.log_bayes,
         parameters=tuple(
             ParameterValue(name=name.removeprefix(prefix), value=value, stderr=sd, unit=units.get(name, "1"))
-            for name, (value, sd) in values.items() if fitted and name != effect.clock
+            for name, (value, sd) in values.items() if not effect.is_open and name != effect.clock
         ),
         confusable_with=_rivals(answer, setup, posterior),
         heat_mean_W=mean,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from diagnosis.decision.posterior import Repeating, ScaledError
 from diagnosis.engine.learnt import widest_class
+from diagnosis.results.mean_loss import FAR_SD
 from diagnosis.results.number_format import MINUS, number, share, with_error
 from diagnosis.results.result_parts import (
     LEAST_RIVAL,
@@ -21,6 +22,7 @@ from diagnosis.results.result_parts import (
 )
 from models.mechanisms import OPEN_FORM
 from models.mechanisms.measurement import FAMILY as MEASUREMENT
+from models.quantities.units import behind_a_number
 
 if TYPE_CHECKING:
     from diagnosis.results.result import Diagnosis
@@ -48,7 +50,6 @@ MOST_UNSEEN = 6  # effects that the summary names of those that cannot be seen
 OF_DATE = ("since", "lasting")  # parameters that the date contains
 OF_SWITCH = ("set_point", "band")  # parameters that the switching temperatures contain
 LONG_S = 7200.0  # times beyond are told in hours
-FAR_SD = 2.0  # standard errors from an estimate, beyond which the number that predicts is told too
 LITTLE_SPREAD = 0.05  # deviation between sessions that is not worth a word, in prior standard deviations
 
 
@@ -145,7 +146,7 @@ def _farthest(d: Diagnosis) -> tuple[float, str]:
 
 
 def _is_clear(d: Diagnosis) -> bool:
-    """False of evidence that hardly exceeds what is needed: one half of the probability is left to nothing there."""
+    """True if something is missing with the probability of a claim; at the threshold it is one half."""
     return 1.0 - d.kinds.get("nothing", 0.0) >= d.settings.claim_from
 
 
@@ -232,8 +233,8 @@ def _how_sure(d: Diagnosis) -> tuple[str, ...]:
     far = sorted((c for c in d.calibration if c.is_far), key=lambda c: -abs(c.shift_in_sd))
     if far:
         deviations = {p.name for p in d.network.parameters if p.start == 0.0}  # from what the definition assumes
-        told = [f"{c.parameter} {'off by' if c.parameter in deviations else '='} {c.estimate:.3g}{_unit(c.unit)} "
-                f"({abs(c.shift_in_sd):.1f} sd)" for c in far[:MOST_FAR]]  # fmt: skip
+        told = [f"{c.parameter} {'off by' if c.parameter in deviations else '='} {c.estimate:.3g}"
+                f"{behind_a_number(c.unit)} ({abs(c.shift_in_sd):.1f} sd)" for c in far[:MOST_FAR]]  # fmt: skip
         lines.append(f"Far from what was expected: {', '.join(told)}.")
     if d.remaining_note:
         lines.append(f"Remaining: {d.remaining_note}")
@@ -292,13 +293,13 @@ def _how_much_better(d: Diagnosis) -> tuple[str, ...]:
             "What was learnt of model error is left out: with it held-out temperatures are missed by "
             f"{d.left_out_K:.2f} K"
         )
-    not_closer = d.has_correction and d.holdout.after > d.holdout.calibrated
     nat = f"{abs(d.holdout_gain):.0f} nat" if abs(d.holdout_gain) >= 1.0 else "less than one nat"
+    not_closer, more_probable = d.has_correction and d.holdout.after > d.holdout.calibrated, d.holdout_gain > 0.0
     if not_closer:
-        course = f"; with model error allowed for they are more probable with the correction, by {nat} of log score"
+        score = f"; with model error allowed for they are more probable with the correction, by {nat} of log score"
         lines.append(
             "Held-out temperatures are not closer than with the calibrated model: predict with calibrated.toml"
-            f"{course if d.holdout_gain > 0.0 else ''}"
+            f"{score if more_probable else ''}"
         )
     lines += [
         f"{name} is missed: {d.holdout.recordings[name].after:.2f} K, where it was learnt from {d.train.after:.2f} K"
@@ -311,9 +312,9 @@ def _how_much_better(d: Diagnosis) -> tuple[str, ...]:
         lines.append(
             f"The correction also holds {further} effect{'s' * (further > 1)} without a certain name (grade learnt)"
         )
-    fitted = d.has_correction and math.isfinite(d.holdout_gain) and d.holdout_gain != 0.0
-    if fitted and not (not_closer and d.holdout_gain > 0.0):
-        way = "better than" if d.holdout_gain > 0.0 else "worse than"
+    scored = d.has_correction and math.isfinite(d.holdout_gain) and d.holdout_gain != 0.0  # 0: nothing was fitted
+    if scored and not (not_closer and more_probable):
+        way = "better than" if more_probable else "worse than"
         lines.append(f"Held-out readings are predicted {way} by the calibrated model, by {nat} of log score")
     if d.contradicted:
         if d.holdout.contradict(d.holdout_gain, d.noise_K, d.further_threshold):
@@ -358,7 +359,8 @@ def values_told(finding: Finding) -> str:
     if finding.heat_mean_W > 0.0:
         values.append(("mean |heat|", finding.heat_mean_W, finding.heat_stderr_W, "W"))
     told = [
-        f"{name} = {with_error(value, stderr).replace(MINUS, '-')}{_unit(unit)}" for name, value, stderr, unit in values
+        f"{name} = {with_error(value, stderr).replace(MINUS, '-')}{behind_a_number(unit)}"
+        for name, value, stderr, unit in values
     ]
     if finding.switching is not None:
         told.append(f"on at {finding.switching.on_degC:.1f} degC, off at {finding.switching.off_degC:.1f} degC")
@@ -372,7 +374,7 @@ def predicting_told(d: Diagnosis, finding: Finding) -> str:
         return ""
     there = {p.name.removeprefix(f"{term.label}_"): p.start for p in term.parameters}
     both = [(p, there[p.name]) for p in finding.parameters if p.name in there and p.name not in OF_DATE]
-    told = [f"{p.name} = {number(value)}{_unit(p.unit)}" for p, value in both
+    told = [f"{p.name} = {number(value)}{behind_a_number(p.unit)}" for p, value in both
             if 0.0 < FAR_SD * p.stderr < abs(value - p.value)]  # fmt: skip
     return f"in the model that predicts (correction.toml): {', '.join(told)}" if told else ""
 
@@ -387,11 +389,6 @@ def date_told(date: Change) -> str:
 
 def _time(seconds: float) -> str:
     return f"{seconds / 3600.0:.2f} h" if abs(seconds) > LONG_S else f"{seconds:.0f} s"
-
-
-def _unit(symbol: str) -> str:
-    """A unit behind a number."""
-    return "" if symbol == "1" else f" {symbol}"
 
 
 def size_of(one: ScaledError) -> str:

@@ -41,7 +41,7 @@ def locations_of(setup: InferenceSetup, posterior: Posterior) -> tuple[Location,
             nodes.setdefault(effect.label, node_in(setup.nominal, effect))
         for node in {nodes[effect.label] for effect in judged.effects}:
             weights[node] = weights.get(node, 0.0) + probability / given
-            if judged.fit is not None and probability >= LEAST_PLACE:
+            if judged.fit is not None and probability / given >= LEAST_PLACE:
                 best.setdefault(node, judged)
     told = sorted(((n, w) for n, w in weights.items() if w >= LEAST_PLACE), key=lambda item: -item[1])
     return tuple(_place(setup, node, weight, best.get(node), nodes) for node, weight in told)

@@ -12,7 +12,7 @@ from diagnosis.engine.mean_loss import mean_loss
 from diagnosis.engine.predict import Prediction
 from diagnosis.engine.scale import all_sizes_are_unknown, is_of_temperatures
 
-FAR_SD = 2.0  # standard errors from the estimate, beyond which a model is not to be asked for losses
+FAR_SD = 2.0  # standard errors from an estimate, beyond which another number is not the same
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,6 +14,7 @@ from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.scale import scale_direction
 from diagnosis.engine.scan import scan, scope_of
 from diagnosis.engine.sessions import sessions_apart
+from models.quantities.units import behind_a_number
 
 NOTED_FROM = 5.0  # nats
 AT_LIMIT = 1e-6  # of a value, from a limit
@@ -108,7 +109,7 @@ def limit_notes(fit: Fit) -> tuple[str, ...]:
     for unknown, z in zip(fit.experiment.unknowns, fit.z.tolist(), strict=True):
         p, value = unknown.parameter, unknown.value(z)
         if min(value - p.lower, p.upper - value) <= AT_LIMIT * abs(value):
-            at.append(f"{p.name} = {value:.4g}{'' if p.unit == '1' else f' {p.unit}'}")
+            at.append(f"{p.name} = {value:.4g}{behind_a_number(p.unit)}")
     if not at:
         return ()
     verb = "is at its limit and stands" if len(at) == 1 else "are at their limits and stand"

@@ -25,6 +25,7 @@ from models.definition.sections import Name, OneOrMore, Section, Text
 from models.files.toml_file import parse_schema_1, read_text
 from models.network.expressions import Law
 from models.network.laws import Parameter
+from models.quantities.units import behind_a_number
 from models.simulation.thermal_network import ExtraState, ThermalNetwork
 from models.terms.law_file import LawParameter, LawState, LawTable
 from models.terms.term import FACTORS, Term
@@ -371,7 +372,7 @@ def _calibration_faults(calibration: Iterable[Estimate], network: ThermalNetwork
             continue
         slack = BOUND_TOLERANCE * abs(estimate.value)
         if not p.lower - slack <= estimate.value <= p.upper + slack:
-            unit = "" if p.unit == "1" else f" {p.unit}"
+            unit = behind_a_number(p.unit)
             yield f"{p.name!r} to {estimate.value:g}{unit}; {p.lower:g} to {p.upper:g}{unit} is possible"
 
 

@@ -20,6 +20,17 @@ INSIDE: Mapping[str, str] = {
 }  # fmt: skip
 
 
+def behind_a_number(symbol: str) -> str:
+    """A unit as it stands behind a number, with a space; nothing for the unit 1.
+
+    Examples
+    --------
+    >>> f"0.6{behind_a_number('1')}, 5{behind_a_number('W/K')}"
+    '0.6, 5 W/K'
+    """
+    return "" if symbol == "1" else f" {symbol}"
+
+
 @dataclass(frozen=True, kw_only=True)
 class Unit:
     """A unit.

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pytest
 
-from diagnosis.candidates.hypotheses import hypothesis_of
+from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of
+from diagnosis.engine import switch_grid
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.refit import ROUGH, SWITCH_SHARES, refit
 from diagnosis.engine.scan import SHAPES_TRIED, Scan, course_of_heat, scan
@@ -168,3 +170,14 @@ def test_what_switches_starts_from_several_strengths(
     starts.clear()
     found_with(without, placed)  # a machine without it: other sizes bring nothing either
     assert len(starts) == 1
+    grids, scanned = list[int](), switch_grid.scan
+
+    def counted(fit: Fit, candidates: Sequence[Hypothesis]) -> Scan:
+        grids.append(len(candidates))
+        return scanned(fit, candidates)
+
+    monkeypatch.setattr(switch_grid, "scan", counted)
+    found_with(without, placed)
+    assert len(grids) == 1  # and a finer grid neither
+    found_with(base, placed)
+    assert len(grids) == 1 + switch_grid.LEVELS

@@ -28,7 +28,7 @@ def ride(gearbox: Gearbox, name: str, hours: float) -> Recording:
     return replace(recording_of(columns, {node: made[f"T_{node}_degC"] for node in nodes}), name=name)
 
 
-def test_the_hours_of_a_baseline_do_not_count(fzg: Gearbox) -> None:
+def test_heat_is_that_of_the_tested_hours_and_of_a_probable_explanation(fzg: Gearbox) -> None:
     setup, experiment = prepare_experiment(fzg, [ride(fzg, "may", 1.0)], [], [ride(fzg, "march", 2.0)])
     plain = calibrate(experiment)
     network = plain.experiment.machine.model.network
@@ -47,3 +47,10 @@ def test_the_hours_of_a_baseline_do_not_count(fzg: Gearbox) -> None:
     (place,) = locations_of(setup, posterior)
     assert place.regime == "always" and {recording for recording, _, _ in place.when} == {"may"}
     assert abs(place.heat_mean_W - place.heat_max_W) < 0.01 * place.heat_max_W  # the speed is constant
+    (unsure,) = locations_of(setup, replace(posterior, log_e=1.0, threshold=20.0))  # where to look first all the same
+    assert unsure.heat_mean_W == place.heat_mean_W
+    # What was not fitted is most probable there: the heat of another explanation, which is refuted, is not its heat.
+    other = Judged(effects=(replace(effect, name="pump_heat", law="pump_heat"),), log_bayes=50.0,
+                   error_class=error_classes()[0])  # fmt: skip
+    (without,) = locations_of(setup, replace(posterior, judged=(other, replace(judged, log_bayes=5.0))))
+    assert without.probability > 0.999 and without.heat_mean_W == 0.0
