@@ -140,12 +140,35 @@ def in_times(spans: Sequence[tuple[float, float]]) -> DatedCourse:
         Beginnings and ends on the time axis, [s]
     """
     times = ", ".join(f"{first / HOUR_S:.2f} to {last / HOUR_S:.2f} h" for first, last in spans)
-    acts = (sp.Piecewise((1, first <= NOW), (0, True)) - sp.Piecewise((1, last < NOW), (0, True))
-            for first, last in spans)  # fmt: skip
     return DatedCourse(
         ending=WHILE, how="from_date", sentence=f"From {times} after the first row of the first recording",
-        parameters=(), variants=np.empty((1, 0)), law=sp.Add(*acts),
+        parameters=(), variants=np.empty((1, 0)), law=sp.Add(*(_between(first, last) for first, last in spans)),
     )  # fmt: skip
+
+
+def in_one_of(spans: Sequence[tuple[float, float]]) -> DatedCourse:
+    """In one of given times: in one recording, for what is set again with every file.
+
+    Parameters
+    ----------
+    spans : sequence of (float, float)
+        Beginnings and ends on the time axis, [s]
+    """
+    first, lasting = symbol("since"), symbol("lasting")
+    variants = np.array([(begin, end - begin) for begin, end in spans])
+    given = (
+        Parameter(name=name, unit="s", start=start, sd=0.0, lower=0.0, upper=float(variants.max()), log=False)
+        for name, start in zip(("since", "lasting"), variants[0].tolist(), strict=True)
+    )
+    return DatedCourse(
+        ending=WHILE, how="from_date", sentence="In one recording", parameters=tuple(given), variants=variants,
+        law=_between(first, first + lasting),
+    )  # fmt: skip
+
+
+def _between(first: float | sp.Expr, last: float | sp.Expr) -> sp.Expr:
+    """1 from one moment to another, both included."""
+    return sp.Piecewise((1, first <= NOW), (0, True)) - sp.Piecewise((1, last < NOW), (0, True))
 
 
 def over_hours(axis: Axis) -> DatedCourse:

@@ -15,6 +15,7 @@ from diagnosis.candidates.dated import (
     changing,
     for_a_while,
     has_clock,
+    in_one_of,
     in_times,
     may_change,
     over_hours,
@@ -56,17 +57,22 @@ def candidates_of(setup: InferenceSetup, experiment: Experiment) -> tuple[Hypoth
     factors = factors_of(network, setup.scale, setup.channels)
     controls = list(moved_set_points(setup.known.findings, setup.scale))
     axis = axis_of(experiment)
-    several = len({piece.recording for piece in experiment.pieces} - experiment.healthy) > 1
-    spans = standing_still(experiment)
+    files, still = _spans(experiment), standing_still(experiment)
+    several = len(files) > 1
     names = {law_of(name): name for name in setup.catalogue} | {name: name for name in setup.catalogue}
     return tuple(
         replace(one, known_as=names.get(one.name, names.get(one.law)))
         for one in (
             *(hypothesis_of(one) for one in placed if one.form != "stuck"),
             *(
-                changing(one, in_times(spans[one.place]), axis)
+                changing(one, in_times(still[one.place]), axis)
                 for one in placed
-                if one.form == "stuck" and one.place in spans
+                if one.form == "stuck" and one.place in still
+            ),
+            *(
+                changing(one, in_one_of(list(files.values())), axis)
+                for one in placed
+                if one.form == "swapped" and several
             ),
             *changes(factors, placed, axis, _sensor_sd(experiment)),
             *(hypothesis_of(one) for one in controls),
@@ -132,20 +138,31 @@ def axis_of(experiment: Experiment) -> Axis:
     for piece in experiment.pieces:
         if piece.recording not in experiment.healthy:
             of_recording.setdefault(piece.recording, []).append(piece)
-    names = sorted(of_recording, key=lambda name: experiment.starts_at.get(name, 0.0))
-    span = {name: float(of_recording[name][-1].time[-1] - of_recording[name][0].time[0]) for name in names}
+    spans = _spans(experiment)
+    longest = max(last - first for first, last in spans.values())
     dates: list[float] = []
-    for name in names:
-        start, pieces = experiment.starts_at.get(name, 0.0), of_recording[name]
-        if span[name] >= LONG * max(span.values()):
-            dates += [start + date for date in _running(pieces)]
+    for name, (first, last) in spans.items():
+        start = experiment.starts_at.get(name, 0.0)
+        if last - first >= LONG * longest:
+            dates += [start + date for date in _running(of_recording[name])]
         else:
-            middle = start + pieces[0].time[0] + 0.5 * span[name]
-            dates += [middle] if name == names[0] else [start, middle]
-    end = max(experiment.starts_at.get(name, 0.0) + float(of_recording[name][-1].time[-1]) for name in names)
+            middle = 0.5 * (first + last)
+            dates += [start, middle] if dates else [middle]
+    end = max(last for _, last in spans.values())
     interval = float(np.median(np.concatenate([piece.steps for piece in experiment.pieces])))
     return Axis(dates=np.array(sorted(dates)), end=end, until=max(end, experiment.until),
                 edge_s=2.0 * max(EDGE_S, interval if experiment.slow else 0.0))  # fmt: skip
+
+
+def _spans(experiment: Experiment) -> dict[str, tuple[float, float]]:
+    """First and last row of every recording that is not healthy, in the order of time, [s] on the axis."""
+    spans: dict[str, tuple[float, float]] = {}
+    for piece in experiment.pieces:
+        if piece.recording not in experiment.healthy:
+            start = experiment.starts_at.get(piece.recording, 0.0)
+            first, _ = spans.get(piece.recording, (start + float(piece.time[0]), 0.0))
+            spans[piece.recording] = first, start + float(piece.time[-1])
+    return dict(sorted(spans.items(), key=lambda one: experiment.starts_at.get(one[0], 0.0)))
 
 
 def _running(pieces: Sequence[Piece]) -> list[float]:

@@ -240,6 +240,33 @@ def test_a_reading_that_stands_still_is_a_candidate_in_those_times_only(fzg: Gea
     assert acts(3600.0, 1.0, experiment.starts_at["b"]) == 0.0
 
 
+def test_names_of_columns_may_be_exchanged_in_one_file_alone(fzg: Gearbox) -> None:
+    made = [recorded(fzg, name, hours=hours, seed=seed) for seed, (name, hours) in enumerate((("a", 1.5), ("b", 1.0)))]
+    first, second = made[1].channels[:2]
+    exchanged = (replace(first, values=second.values), replace(second, values=first.values), *made[1].channels[2:])
+    setup, experiment = prepare_experiment(fzg, [made[0], replace(made[1], channels=exchanged)], made[:1])
+    swaps = [one for one in candidates_of(setup, experiment) if one.law == "swapped_channels" and one.clock]
+    (found,) = [one for one in swaps if {first.name, second.name} == set(one.added.target)]
+    names = [p.name.removeprefix(f"{found.added.label}_") for p in found.added.parameters]
+    assert names == ["strength", "since", "lasting", "start"]
+    start = experiment.starts_at["b"]
+    long, short = (float(piece.time[-1]) for piece in experiment.pieces)
+    assert found.variants[:, 1:3].tolist() == [[0.0, long], [start, short]]
+    acts = sp.lambdify([symbol("time"), *(symbol(p.name) for p in found.added.parameters)], found.added.expression)
+    assert [float(acts(at, 1.0, start, short, start)) for at in (0.0, short, short + 20.0)] == [1.0, 1.0, 0.0]
+    assert float(acts(long, 1.0, start, short, 0.0)) == 0.0
+    middles = experiment.fit(iterations=0)  # a calibration bends itself round it
+    judged = scan(middles, swaps)
+    singles = judged.singles(judged.gram.given(judged.unknowns))
+    best = int(np.argmax(singles.log_bayes))
+    assert swaps[best] is found and judged.best[best] == 1  # the second recording
+    assert singles.value[best] == pytest.approx(1.0, abs=0.02)
+    refitted = refit(middles, found, 1, float(singles.value[best]))
+    assert refitted.log_evidence > calibrate(experiment).log_evidence + 1000.0
+    alone = prepare_experiment(fzg, made[:1], made[1:])
+    assert not [one for one in candidates_of(*alone) if one.law == "swapped_channels" and one.clock]
+
+
 def test_what_grows_is_known_to_the_end_of_the_last_recording(fzg: Gearbox) -> None:
     made = [recorded(fzg, name, hours=hours, seed=seed) for seed, (name, hours) in enumerate((("a", 1.0), ("b", 0.5)))]
     setup, experiment = prepare_experiment(fzg, made[:1], made[1:])
