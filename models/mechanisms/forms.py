@@ -29,6 +29,7 @@ MEANINGS = {
     ("every", "s"): "time after which it comes again",
     ("exponent", "1"): "exponent of the speed, or of the law's other driver",
     ("fade", "1"): "relative speed times viscosity at which half of it is left",
+    ("feet", "1"): "conductance of the feet over that from the foundation to the air",
     ("film", "1"): "how fast it falls with the speed, which makes the film",
     ("lag", "s"): "time constant",
     ("leak", "1"): "heat flow of the tank to the air over that of the oil",

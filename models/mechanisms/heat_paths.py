@@ -15,13 +15,23 @@ COOL_DOWN = "stop hot and record the whole cool-down, of the housing above all"
 foundation_conduction = Mechanism(
     name="foundation_conduction",
     family=FAMILY_OUT,
-    kind="link",
+    kind="source",
     places=("each housing", "housing"),
-    other="frame",
-    parameters=lambda scale: (strength(0.4 * scale.conductance, "W/K", "conductance to the foundation"),),
-    law=lambda s: s.strength,
-    says="Heat leaves through the feet into the foundation ({place}).",
-    reference="Navet et al. 2020: 2 to 10 W/K, compared with 7 W/K to air, on the FZG rig; from memory",
+    parameters=lambda scale: (
+        strength(0.4 * scale.conductance, "W/K", "from here through the foundation to the air, once it is warm"),
+        positive("feet", 1.0, sd=1.5, grid=(0.02, 0.5, 3.0, 15.0)),
+        positive("lag", 5000.0, sd=1.0, unit="s", grid=(1500.0, 5000.0, 20000.0)),
+    ),
+    states=(
+        Memory(
+            name="frame",  # its rise above the air, at whose temperature it starts
+            rate=lambda s: (s.feet / (1.0 + s.feet) * (s.T_here - s.T_ambient) - s.frame) / s.lag,
+        ),
+    ),
+    law=lambda s: s.strength * (1.0 + s.feet) * (s.T_ambient + s.frame - s.T_here),
+    says="Heat leaves through the feet into the foundation, a frame or a bed, and warms it ({place}).",
+    reference="mass between two conductances: lag = its capacity over their sum; Navet et al. 2020: 2 to 10 W/K, "
+    "compared with 7 W/K to air, on the FZG rig; from memory",
     experiment=COOL_DOWN + "; the part on the foundation is the cooler one",
     separate_by={
         "air_cooling_change": "hold one state with the fan on and off: conduction stays",

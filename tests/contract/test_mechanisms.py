@@ -280,9 +280,22 @@ class TestInANetwork:
         assert {p.name: (p.start, p.sd) for p in read.findings[0].term.parameters} == estimates
 
 
-@pytest.mark.parametrize("name", ["oil_tank", "motor_flange"])
+def test_the_foundation_is_a_mass_between_two_conductances() -> None:
+    feet, air, capacity = sp.symbols("feet air capacity", positive=True)
+    here, ambient = symbol("T_housing_lower"), symbol("T_ambient")
+    term = next(one for one in placed("foundation_conduction") if one.place == "housing_lower")
+    numbers = {"strength": feet * air / (feet + air), "feet": feet / air, "lag": capacity / (feet + air)}
+    given = {symbol(f"{term.label}_{name}"): value for name, value in numbers.items()}
+    (frame,) = term.states
+    rise = symbol(frame.name)
+    flow = feet * (here - ambient - rise)
+    assert sp.simplify(term.expression.xreplace(given) + flow) == 0
+    assert sp.simplify(frame.rate.xreplace(given) - (flow - air * rise) / capacity) == 0
+
+
+@pytest.mark.parametrize("name", ["oil_tank", "motor_flange", "foundation_conduction"])
 def test_what_stands_still_as_cold_as_the_air_stays_so(name: str) -> None:
-    """A machine is defined at 20 degC and started at -30: tank and motor are as cold as the air, too."""
+    """A machine is defined at 20 degC and started at -30: tank, motor, bed are as cold as the air, too."""
     scale, term = SCALES["conveyor"], placed(name, "conveyor")[0]
     at_rest = Cycle(
         np.array([0.0, 3600.0]), {"speed": np.zeros(2), "torque": np.zeros(2), "T_ambient": np.full(2, -30.0)}
