@@ -16,6 +16,7 @@ from diagnosis.engine import known_switches
 from diagnosis.engine.families import candidates_of
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.known_switches import start_with_switches
+from diagnosis.engine.mean_loss import mean_loss
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.recordings.recording import Recording
 from diagnosis.report.write import correction_of
@@ -25,7 +26,7 @@ from models.correction.corrected_gearbox import corrected_gearbox
 from models.correction.correction import Correction, Estimate, Finding, read_correction, write_correction
 from models.correction.instruments import SensorCorrection
 from models.mechanisms import CATALOGUE, Scale
-from tests.unit.diagnosis.inference_example import NODES, recorded
+from tests.unit.diagnosis.inference_example import NODES, at, recorded
 
 TRUE = {"strength": 6.0, "set_point": 38.0, "band": 3.0}
 ON = "fan_thermostat_housing"
@@ -202,3 +203,29 @@ def test_its_correction_holds_the_control_as_it_was_last(
     as_known = corrected_gearbox(fzg, known)
     turned, before = (m.steady_state(speed=2500.0, torque=100.0) for m in (machine, as_known))
     assert turned.temperatures["oil"] < before.temperatures["oil"] - 2.0
+
+
+BED = {"strength": 1.4, "feet": 10.0, "lag": 2700.0}  # 15 W/K to 45 kJ/K; the gearbox itself has 22 kJ/K
+
+
+def bed(fzg: Gearbox, numbers: Mapping[str, float], share: float = 0.0) -> Correction:
+    """A bed under the lower housing, its numbers known by some share of them."""
+    given = {name: (value, share * value) for name, value in numbers.items()}
+    return Correction.of(fzg, findings=[
+        known_finding(fzg, fzg.network(), "foundation_conduction", given, place="housing_lower")])  # fmt: skip
+
+
+def test_a_known_bed_gives_the_losses_back(fzg: Gearbox) -> None:
+    """None is measured, so watts rest on heat capacities; sliding friction is 30 % above the definition's."""
+    factors, known = {"mesh": 1.3, "h_air": 1.15}, bed(fzg, {"strength": 2.0, "feet": 5.0, "lag": 4000.0}, share=0.8)
+    ride = recorded(fzg, "learn", hours=6.0, seed=3, factors=factors, correction=bed(fzg, BED))
+    true, without, rough = (
+        prepare_experiment(gearbox, [ride], [ride])[1]
+        for gearbox in (corrected_gearbox(fzg, bed(fzg, BED)), fzg, corrected_gearbox(fzg, known))
+    )
+    loss, _ = mean_loss(true.fit(at(true, factors), iterations=0))
+    nominal, found = calibrate(without), calibrate(rough)
+    assert abs(mean_loss(nominal)[0] - loss) > 0.1 * loss
+    assert abs(mean_loss(found)[0] - loss) < 0.05 * loss
+    lag = next(value for name, value in values_of(found).items() if name.endswith("lower_lag"))
+    assert lag == pytest.approx(BED["lag"], rel=0.05)
