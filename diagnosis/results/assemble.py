@@ -27,7 +27,7 @@ from diagnosis.results.locations import locations_of
 from diagnosis.results.mean_loss import mean_loss_of
 from diagnosis.results.notes import baseline_notes, limit_notes, ratio_notes
 from diagnosis.results.predicted_run import PredictedRun
-from diagnosis.results.predictions import Predicted
+from diagnosis.results.predictions import PredictingModel
 from diagnosis.results.result import Diagnosis, Verdict
 from diagnosis.results.result_parts import (
     NO_CLAIM,
@@ -98,8 +98,8 @@ def assemble(
     """
     faulty = () if others is None else others.channels
     valid = validate(setup, experiment, posterior, answers, plain=plain, calibration=calibration, faulty=faulty)
-    posterior, best, final = valid.posterior, valid.best, valid.model.predicted.final
-    train, holdout = valid.model.train, valid.model.holdout
+    posterior, best, predicting = valid.posterior, valid.best, valid.model
+    final, train, holdout = predicting.final, predicting.train, predicting.holdout
     settings, known = posterior.settings, setup.known
     reported = _distinct([
         (answer, finding_of(answer, answer.best.fit or final, setup, posterior))
@@ -115,10 +115,10 @@ def assemble(
     verdict = verdict_of(posterior, [answer for answer, _ in reported], unseen, unfit=unfit, badly=badly)
     location = locations_of(setup, posterior) if posterior.detected or verdict in NO_CLAIM else ()
     inputs = setup.gearbox.network().inputs
-    most_probable = valid.model.best if others is None else others.posterior.nothing
+    most_probable = predicting.best if others is None else others.posterior.nothing
     believed = (most_probable.fit if most_probable else None) or calibration.fit
-    runs = valid.model.predicted.train
-    effects = valid.model.best.effects if valid.model.best else ()
+    runs = predicting.train_runs
+    effects = predicting.best.effects if predicting.best else ()
     model = _calibrated(final, (runs["after"], runs["before"]), believed, plain, inputs, effects)
     return Diagnosis(
         verdict=verdict,
@@ -132,7 +132,7 @@ def assemble(
         train=train,
         holdout=holdout,
         faulty=faulty,
-        terms=_terms(valid.model.best, final),
+        terms=_terms(predicting.best, final),
         known=known,
         alone=_calibrated(plain, (runs["calibrated"], runs["before"]), calibration.fit, plain, inputs),
         joint=joint_estimate_of(final),
@@ -152,11 +152,11 @@ def assemble(
             setup, verdict, findings, location if posterior.detected else (), unseen,
             calibration=model.calibration, missed=holdout.far_beyond(train, settings.matters_K),
         ),
-        courses=_courses(setup, valid.model.predicted),
+        courses=_courses(setup, predicting),
         network=setup.nominal,
         shapes=setup.shapes,
-        learnt=valid.model.predicted.learnt,
-        left_out_K=valid.model.predicted.left_out_K,
+        learnt=predicting.learnt,
+        left_out_K=predicting.left_out_K,
         inputs=_provenance(setup),
         notes=(
             *ratio_notes(final), *limit_notes(final), *baseline_notes(experiment, posterior, valid.answers),
@@ -326,12 +326,12 @@ def _floor(setup: InferenceSetup, factors: RandomHeat) -> str:
 # ---------------------------------------------------------------------- fits and courses
 
 
-def _courses(setup: InferenceSetup, predicted: Predicted) -> tuple[PredictedRun, ...]:
+def _courses(setup: InferenceSetup, predicting: PredictingModel) -> tuple[PredictedRun, ...]:
     def by_channel(values: Array) -> dict[str, Array]:
         return {name: values[:, i] for i, name in enumerate(setup.channels)}
 
     result, parts = [], [part.name for part in setup.nominal.parts]
-    for held_out, states in ((False, predicted.train), (True, predicted.holdout)):
+    for held_out, states in ((False, predicting.train_runs), (True, predicting.holdout_runs)):
         for before, calibrated, after in zip(states["before"], states["calibrated"], states["after"], strict=True):
             piece = before.piece
             at = np.clip(np.arange(len(piece.time)), 0, len(piece.steps) - 1)
