@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -20,7 +19,7 @@ from diagnosis.forward.grid import too_short
 from diagnosis.forward.whitening import RandomHeat
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.advice import next_test
-from diagnosis.results.findings import change_of, estimates_of, finding_of, joint_estimate_of, switch_errors
+from diagnosis.results.findings import change_of, estimates_of, finding_of, joint_estimate_of, parameters_of
 from diagnosis.results.held_out import validate
 from diagnosis.results.instruments import sensors_and_inputs_of
 from diagnosis.results.locations import locations_of
@@ -44,7 +43,6 @@ from diagnosis.setup.inference_setup import InferenceSetup
 from diagnosis.setup.noise import HEAT_FRACTION, HEAT_TIME_S, PARAMETRIC_FRACTION, PARAMETRIC_K, WANDER
 from models.base.types import Array
 from models.base.version import project_version
-from models.network.laws import Parameter
 from models.terms.term import Term
 
 BADLY = 2.0  # times the size that matters, which a calibrated model may be off for a "consistent"
@@ -211,15 +209,12 @@ def _terms(best: Judged | None, final: Fit) -> tuple[Term, ...]:
     """Terms of the fit that predicts, with its values and standard errors."""
     if best is None or best.fit is None:
         return ()
-    found = estimates_of(final)
-    terms = [effect.term for effect in best.effects if effect.term is not None]
-    more = {name: error for term in terms for name, error in switch_errors(final, term).items()}
-
-    def as_found(p: Parameter) -> Parameter:
-        value, error = found.get(p.name, (p.start, 0.0))
-        return replace(p, start=value, sd=math.hypot(error, more.get(p.name, 0.0)))
-
-    return tuple(replace(term, parameters=tuple(map(as_found, term.parameters))) for term in terms)
+    found = [(effect.term, parameters_of(final, effect.term)) for effect in best.effects if effect.term is not None]
+    return tuple(
+        replace(term, parameters=tuple(
+            replace(p, start=values[p.name][0], sd=values[p.name][1]) for p in term.parameters
+        )) for term, values in found
+    )  # fmt: skip
 
 
 def _distinct(found: Sequence[tuple[Answer, Finding]]) -> list[tuple[Answer, Finding]]:
