@@ -67,7 +67,6 @@ def page(diagnosis: Diagnosis) -> str:
         values_told=values_told,
         date_told=date_told,
         recordings=len({course.recording for course in diagnosis.courses}),
-        provenance=wording.provenance(diagnosis.inputs),
     )  # fmt: skip
 
 

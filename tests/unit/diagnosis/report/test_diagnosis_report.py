@@ -150,6 +150,12 @@ def test_names_from_files_cannot_break_out_of_the_page() -> None:
     assert Text(text).faults == []
 
 
+def test_what_a_diagnosis_was_made_from_is_told_one_by_one(pages: dict[str, str]) -> None:
+    text = Text(pages["consistent"]).plain
+    assert (f"recordings: train_1 {'9b1c' * 16} held out: hold_1 {'04de' * 16} switched off windage gearbox "
+            f"{'3f7a' * 16} version 0.1.0") in text  # fmt: skip
+
+
 def test_pieces_of_one_recording_are_told_apart_and_counted_once() -> None:
     base = consistent()
     diagnosis = replace(base, courses=(base.courses[0], base.courses[0], base.courses[2]))
