@@ -10,7 +10,7 @@ from diagnosis.forward.recurrence import lagged
 from models.base.errors import InputError
 from models.base.types import Array
 from models.network.laws import compile_function, function_source
-from models.quantities.quantities import column_of, is_total_loss, quantity_of_column
+from models.quantities.quantities import column_of, is_total_loss, node_columns, quantity_of_column
 from models.terms.term import Term
 
 
@@ -79,7 +79,9 @@ def law_along(term: Term, columns: Mapping[str, Array]) -> Array:
     InputError
         If the law needs what the result lacks.
     """
-    signals = {"time": columns["time_s"], **{quantity_name(name): values for name, values in columns.items()}}
+    signals = {"time": columns["time_s"], **columns}
+    signals |= {f"T_{node}": columns[column] for node, column in node_columns(columns).items()}
+    signals |= {q.name: values for column, values in columns.items() if (q := quantity_of_column(column)) is not None}
     signals |= {p.name: np.asarray(p.start) for p in term.parameters}
     names = sorted(symbol.name for symbol in term.expression.free_symbols)
     missing = [name for name in names if name not in signals]
@@ -88,20 +90,6 @@ def law_along(term: Term, columns: Mapping[str, Array]) -> Array:
     function = compile_function(function_source("law", names, [term.expression], vector=True), "law")
     law = np.asarray(function(*(signals[name] for name in names))[0], dtype=float)
     return np.broadcast_to(law, columns["time_s"].shape)
-
-
-def quantity_name(column: str) -> str:
-    """Name in laws of a column of a result.
-
-    Examples
-    --------
-    >>> quantity_name("T_oil_degC"), quantity_name("torque_Nm"), quantity_name("oil_flow")
-    ('T_oil', 'torque', 'oil_flow')
-    """
-    known = quantity_of_column(column)
-    if known is not None:
-        return known.name
-    return column[:-5] if column.startswith("T_") and column.endswith("_degC") else column
 
 
 def channel_column(channel: str) -> str:
