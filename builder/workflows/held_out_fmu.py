@@ -10,8 +10,8 @@ import numpy as np
 from builder.drive.driver import drive_fmu
 from diagnosis.engine.predict import rmse
 from diagnosis.forward.grid import stands_for
-from diagnosis.forward.recorder import simulated_as_recorded
-from diagnosis.forward.sensor_fault import AS_RECORDED, channel_column
+from diagnosis.forward.recorder import AS_RECORDED, simulated_as_recorded
+from diagnosis.forward.sensor_fault import channel_column
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.predicted_run import PredictedRun
 from diagnosis.results.result import Diagnosis

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from diagnosis.forward.recurrence import lagged
-from diagnosis.forward.sensor_fault import AS_RECORDED, channel_column, columns_as_recorded, delayed, law_along
+from diagnosis.forward.sensor_fault import channel_column, delayed, distorted, law_along
 from models.base.types import Array
 from models.correction.correction import Correction
 from models.correction.instruments import SensorCorrection
@@ -18,6 +18,7 @@ from models.files.cycle import Cycle
 from models.files.cycle_file import RecordedStart
 from models.quantities.quantities import TOTAL_LOSS, column_of_input, is_total_loss, node_columns, node_of_channel
 
+AS_RECORDED = "_as_recorded"  # ending of columns of readings
 PASSES = 3  # simulations where an input follows the machine's own temperatures
 Columns = Mapping[str, Array]
 
@@ -107,9 +108,9 @@ def read_as_recorded(columns: Columns, correction: Correction, *, late: float = 
     Returns
     -------
     dict of column name to Array, shape (N,)
-        ``T_oil_degC_as_recorded`` of every channel of the correction; of all nodes if readings are late
+        ``T_oil_degC_as_recorded`` of every channel of the correction or of a fault; of all nodes if readings are late
     """
-    nodes = node_columns(columns)
+    time, nodes = columns["time_s"], node_columns(columns)
     everything = [*sorted(nodes), TOTAL_LOSS] if late else []
     read = {c: np.asarray(columns[channel_column(c)]) for c in everything if channel_column(c) in columns}
     read |= {
@@ -117,8 +118,17 @@ def read_as_recorded(columns: Columns, correction: Correction, *, late: float = 
         for sensor in correction.sensors
         if channel_column(node_of_channel(sensor.channel, nodes)) in columns
     }
-    found = columns_as_recorded(columns, (finding.term for finding in correction.findings), read)
-    return {name: delayed(values, columns["time_s"], late) for name, values in found.items()} if late else found
+    for term in (finding.term for finding in correction.findings if finding.kind == "sensor"):
+        true = {channel: channel_column(node_of_channel(channel, nodes)) for channel in term.target}
+        channels = [channel for channel in term.target if true[channel] in columns]
+        if channels:
+            readings = np.stack([read.get(name, columns[true[name]]) for name in channels], axis=-1)
+            readings = distorted(term, law_along(term, columns), time, readings, range(len(channels)))
+            read |= dict(zip(channels, readings.T, strict=True))
+    return {
+        f"{channel_column(channel)}{AS_RECORDED}": delayed(values, time, late) if late else values
+        for channel, values in read.items()
+    }
 
 
 def _reading(columns: Columns, sensor: SensorCorrection, node: str) -> Array:

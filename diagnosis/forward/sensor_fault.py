@@ -1,8 +1,8 @@
-"""Readings of a recorder with faulty sensors: readings with the terms of kind ``sensor``."""
+"""Faulty sensors: readings with the terms of kind ``sensor``, and their laws along the columns of a result."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -10,10 +10,8 @@ from diagnosis.forward.recurrence import lagged
 from models.base.errors import InputError
 from models.base.types import Array
 from models.network.laws import compile_function, function_source
-from models.quantities.quantities import column_of, is_total_loss, node_columns, node_of_channel, quantity_of_column
+from models.quantities.quantities import column_of, is_total_loss, node_columns, quantity_of_column
 from models.terms.term import Term
-
-AS_RECORDED = "_as_recorded"  # ending of columns of readings
 
 
 def passed_on(term: Term, law: Array, time: Array, changes: Array, channels: Sequence[int]) -> Array:
@@ -48,6 +46,15 @@ def passed_on(term: Term, law: Array, time: Array, changes: Array, channels: Seq
     return changes
 
 
+def distorted(term: Term, law: Array, time: Array, readings: Array, channels: Sequence[int]) -> Array:
+    """Return readings as a faulty sensor shows them: shifted, or see :func:`passed_on`."""
+    if term.form != "shift":
+        return passed_on(term, law, time, readings, channels)
+    readings = np.array(readings)
+    readings[:, channels] += law[:, None]
+    return readings
+
+
 def delayed(values: Array, time: Array, late: Array | float) -> Array:
     """Return values as they come `late` [s] after their time, on straight lines between the points.
 
@@ -64,43 +71,6 @@ def delayed(values: Array, time: Array, late: Array | float) -> Array:
     return np.asarray((1.0 - share) * values[low] + share * values[low + 1])
 
 
-def columns_as_recorded(
-    columns: Mapping[str, Array], terms: Iterable[Term], read: Mapping[str, Array] | None = None
-) -> dict[str, Array]:
-    """Return the readings of faulty sensors over a simulated cycle.
-
-    Parameters
-    ----------
-    columns : mapping of column name to Array, shape (N,)
-        A result in the columns of the file contract, two rows or more
-    terms : iterable of Term
-        Those of kind ``sensor`` count, with their parameters at their start
-    read : mapping of channel to Array, shape (N,), optional
-        Readings without these faults; by default the truth
-
-    Returns
-    -------
-    dict of column name to Array, shape (N,)
-        ``T_oil_degC_as_recorded`` for every channel that is in `read` or that a term distorts
-    """
-    time = columns["time_s"]
-    nodes = node_columns(columns)
-    read = dict(read or {})
-    for term in terms:
-        true = {channel: channel_column(node_of_channel(channel, nodes)) for channel in term.target}
-        channels = [channel for channel in term.target if true[channel] in columns]
-        if term.kind != "sensor" or not channels:
-            continue
-        law = law_along(term, columns)
-        readings = np.stack([read.get(name, columns[true[name]]) for name in channels], axis=-1)
-        if term.form == "shift":
-            readings = readings + law[:, None]
-        else:
-            readings = passed_on(term, law, time, readings, range(len(channels)))
-        read |= dict(zip(channels, readings.T, strict=True))
-    return {f"{channel_column(channel)}{AS_RECORDED}": values for channel, values in read.items()}
-
-
 def law_along(term: Term, columns: Mapping[str, Array]) -> Array:
     """Law of a term along a result, with its parameters at their start, shape (N,).
 
@@ -109,7 +79,9 @@ def law_along(term: Term, columns: Mapping[str, Array]) -> Array:
     InputError
         If the law needs what the result lacks.
     """
-    signals = {"time": columns["time_s"], **{quantity_name(name): values for name, values in columns.items()}}
+    signals = {"time": columns["time_s"], **columns}
+    signals |= {f"T_{node}": columns[column] for node, column in node_columns(columns).items()}
+    signals |= {q.name: values for column, values in columns.items() if (q := quantity_of_column(column)) is not None}
     signals |= {p.name: np.asarray(p.start) for p in term.parameters}
     names = sorted(symbol.name for symbol in term.expression.free_symbols)
     missing = [name for name in names if name not in signals]
@@ -118,20 +90,6 @@ def law_along(term: Term, columns: Mapping[str, Array]) -> Array:
     function = compile_function(function_source("law", names, [term.expression], vector=True), "law")
     law = np.asarray(function(*(signals[name] for name in names))[0], dtype=float)
     return np.broadcast_to(law, columns["time_s"].shape)
-
-
-def quantity_name(column: str) -> str:
-    """Name in laws of a column of a result.
-
-    Examples
-    --------
-    >>> quantity_name("T_oil_degC"), quantity_name("torque_Nm"), quantity_name("oil_flow")
-    ('T_oil', 'torque', 'oil_flow')
-    """
-    known = quantity_of_column(column)
-    if known is not None:
-        return known.name
-    return column[:-5] if column.startswith("T_") and column.endswith("_degC") else column
 
 
 def channel_column(channel: str) -> str:

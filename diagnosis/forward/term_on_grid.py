@@ -17,7 +17,7 @@ from diagnosis.forward.grid import Piece
 from diagnosis.forward.kept import kept
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.observation import Sensors, boundary_temperatures, to_points
-from diagnosis.forward.sensor_fault import passed_on
+from diagnosis.forward.sensor_fault import distorted, passed_on
 from diagnosis.forward.trajectory import Trajectory, heat_change, losses_along
 from models.base.types import Array
 from models.network.laws import compile_each, symbol
@@ -200,21 +200,20 @@ class TermOnGrid:
 
     def distorted(self, trajectory: Trajectory, sensors: Sensors, read: Array, values: Array) -> Array:
         """Readings with the fault of a term of kind ``sensor``; `values` of shape (parameters,)."""
-        if self.term.form != "shift":
-            return self.passed_on(trajectory, sensors, read, values)
-        read = np.array(read)
-        law = self.law(trajectory, values[None, :], at_points=True)[0][0]
-        for name in self.term.target:
-            read[:, sensors.channels.index(name)] += law
-        return read
+        return distorted(self.term, *self._fault(trajectory, values), read, self._channels(sensors))
 
     def passed_on(self, trajectory: Trajectory, sensors: Sensors, changes: Array, values: Array) -> Array:
         """Changes of the readings as distorted by such a fault, shape (K + 1, channels, ...); most are linear."""
         if self.term.form == "shift":
             return changes
-        law = self.law(trajectory, values[None, :], at_points=True)[0][0]
-        channels = [sensors.channels.index(name) for name in self.term.target]
-        return passed_on(self.term, law, trajectory.piece.time, changes, channels)
+        return passed_on(self.term, *self._fault(trajectory, values), changes, self._channels(sensors))
+
+    def _fault(self, trajectory: Trajectory, values: Array) -> tuple[Array, Array]:
+        """The law, and time, at the grid points."""
+        return self.law(trajectory, values[None, :], at_points=True)[0][0], trajectory.piece.time
+
+    def _channels(self, sensors: Sensors) -> list[int]:
+        return [sensors.channels.index(name) for name in self.term.target]
 
 
 def _compiled(

@@ -1,59 +1,32 @@
-"""Interface of a machine to the reader of recordings; a thermal network and an FMU give it."""
+"""A machine as the reader of recordings needs it: inputs, parts by name, and the usual mapping of its recordings.
+
+A thermal network has them; of an FMU nothing else is known.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from models.quantities.quantities import Input
 
+if TYPE_CHECKING:
+    from models.simulation.thermal_network import ThermalNetwork
 
-class Named(Protocol):
-    """Something with a name."""
-
-    @property
-    def name(self) -> str:
-        """Its name."""
-
-
-class RecordedMachine(Protocol):
-    """A machine that recordings are made of.
-
-    A recording may have measured its parts; for the usual mapping see :mod:`diagnosis.recordings.mapping`.
-    """
-
-    @property
-    def inputs(self) -> Mapping[str, Input]:
-        """Inputs by name."""
-
-    @property
-    def parts(self) -> Sequence[Named]:
-        """Nodes with a heat capacity."""
-
-    @property
-    def recording(self) -> Mapping[str, Any]:
-        """Usual mapping of recordings."""
-
-
-@runtime_checkable
-class MachineDefinition(Protocol):
-    """A definition of such a machine, as a gearbox."""
-
-    def network(self) -> RecordedMachine:
-        """Return the machine."""
+RecordedMachine: TypeAlias = "ThermalNetwork | DescribedMachine"
 
 
 @dataclass(frozen=True)
 class Part:
-    """A node by its name."""
+    """A node with a heat capacity, by its name."""
 
     name: str
 
 
 @dataclass(frozen=True, kw_only=True)
 class DescribedMachine:
-    """A machine of which nothing else is known; see :class:`RecordedMachine`."""
+    """A machine as its description has it; for the usual mapping see :mod:`diagnosis.recordings.mapping`."""
 
     inputs: Mapping[str, Input]
     parts: tuple[Part, ...]

@@ -44,8 +44,7 @@ def read_mdf(path: Path, *, bases: Sequence[str]) -> tuple[pd.DataFrame, dict[st
         raise InputError(f"{path}: reading MDF4 needs asammdf; python -m pip install asammdf")
     from asammdf import MDF
 
-    units: list[dict[str, str]] = []
-    groups: list[pd.DataFrame] = []
+    groups: list[tuple[pd.DataFrame, dict[str, str]]] = []
     try:
         with MDF(path) as file:
             start = file.start_time.timestamp()
@@ -55,33 +54,19 @@ def read_mdf(path: Path, *, bases: Sequence[str]) -> tuple[pd.DataFrame, dict[st
                 ]
                 # Interpolated samples would count as measured; without it, invalid and missing samples are NaN.
                 frame = file.to_dataframe(channels, time_from_zero=False, use_interpolation=False, numeric_1D_only=True)
-                groups.append(frame)
-                units.append(
-                    {
-                        file.groups[group].channels[channel].name: file.get_channel_unit(group=group, index=channel)
-                        for _, group, channel in channels
-                    }
-                )
+                own = {file.groups[group].channels[channel].name: file.get_channel_unit(group=group, index=channel)
+                       for _, group, channel in channels}  # fmt: skip
+                groups.append((frame, own))
     except Exception as error:
         text = str(error).strip().splitlines()
         raise InputError(f"{path}: cannot be read as mf4: {text[0] if text else type(error).__name__}") from error
-    groups, units = _named_apart(groups, units)
-    return _on_rows_of(bases, groups, path), {n: unit for own in units for n, unit in own.items() if unit}, start
-
-
-def _named_apart(
-    groups: list[pd.DataFrame], units: list[dict[str, str]]
-) -> tuple[list[pd.DataFrame], list[dict[str, str]]]:
-    """Add its group to the name of a channel that several groups have."""
-    count = Counter(str(name) for frame in groups for name in frame.columns)
-
-    def apart(name: str, group: int) -> str:
-        return name if count[name] < 2 else f"{name} (group {group})"
-
-    return (
-        [f.rename(columns={n: apart(n, group) for n in f.columns}) for group, f in enumerate(groups, start=1)],
-        [{apart(n, group): unit for n, unit in own.items()} for group, own in enumerate(units, start=1)],
-    )
+    count = Counter(name for frame, _ in groups for name in frame.columns)
+    frames, units = list[pd.DataFrame](), dict[str, str]()
+    for number, (frame, own) in enumerate(groups, start=1):
+        apart = {name: f"{name} (group {number})" for name in frame.columns if count[name] > 1}
+        frames.append(frame.rename(columns=apart))
+        units |= {apart.get(name, name): unit for name, unit in own.items() if unit}
+    return _on_rows_of(bases, frames, path), units, start
 
 
 def _on_rows_of(bases: Sequence[str], groups: list[pd.DataFrame], path: Path) -> pd.DataFrame:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -23,13 +23,16 @@ from diagnosis.recordings.cleaning import (
 from diagnosis.recordings.columns import quantities_of
 from diagnosis.recordings.doubts import doubts
 from diagnosis.recordings.file import open_recording, set_to_one_clock, sha256_of, stem_of
-from diagnosis.recordings.machine import MachineDefinition, RecordedMachine
+from diagnosis.recordings.machine import RecordedMachine
 from diagnosis.recordings.mapping import mapping_of_definition
 from diagnosis.recordings.recording import Channel, Recording
 from diagnosis.recordings.rows import RecordedRows, joined, read_rows
 from diagnosis.recordings.time_axis import moment_text, split_path
 from models.base.errors import InputError, Problems
 from models.quantities.quantities import is_total_loss, node_of_channel
+
+if TYPE_CHECKING:
+    from models.assembly.gearbox import Gearbox
 
 FEWEST_ROWS = 3
 SHORTEST_GAP_S, GAP_STEPS = 60.0, 3.0  # a gap is longer than both, unless stated
@@ -40,7 +43,7 @@ ByRole: TypeAlias = tuple[tuple[Recording, ...], tuple[Recording, ...], tuple[Re
 
 def read_recordings(
     paths: str | Path | Sequence[str | Path],
-    machine: RecordedMachine | MachineDefinition,
+    machine: RecordedMachine | Gearbox,
     *,
     mapping: Path | None = None,
 ) -> tuple[Recording, ...]:
@@ -52,7 +55,7 @@ def read_recordings(
         One entry per recording: a file (.csv, .csv.gz, .parquet, .mf4); several files of one recording, joined in the
         order of time, ``FILE+FILE``; or a part of either, ``FILE@start..end`` (see
         :class:`diagnosis.recordings.time_axis.Part`)
-    machine : Gearbox, ThermalNetwork or other RecordedMachine
+    machine : Gearbox, ThermalNetwork or DescribedMachine
         Defines which nodes and inputs there are
     mapping : Path or None
         Mapping file for all of them (see :mod:`diagnosis.recordings.mapping`); by default ``<stem>.toml`` or
@@ -84,7 +87,7 @@ def read_recordings(
     1    60.0     1500.0        21.5
     2   120.0     1500.0        22.8
     """
-    network = machine.network() if isinstance(machine, MachineDefinition) else machine
+    network: RecordedMachine = machine.network() if hasattr(machine, "network") else machine
     paths = [paths] if isinstance(paths, str | Path) else paths
     recordings: list[Recording] = []
     problems: list[str] = []

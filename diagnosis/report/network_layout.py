@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import pairwise
+from math import fsum
 
 from models.simulation.thermal_network import ThermalNetwork
 
@@ -79,4 +80,4 @@ def _split(row: list[str]) -> list[list[str]]:
 
 
 def _middle(values: list[float], otherwise: float) -> float:
-    return sum(values) / len(values) if values else otherwise
+    return fsum(values) / len(values) if values else otherwise  # in whatever order a set gives them

@@ -15,12 +15,11 @@ from diagnosis.report.chart import Chart
 from diagnosis.results import number_format as numbers
 from diagnosis.results.first_screen import date_told, size_of, values_told
 from diagnosis.results.result import Diagnosis
-from diagnosis.results.result_parts import NO_CLAIM, Calibrated, Errors, Finding, Fits, error_unit, named, title_of
+from diagnosis.results.result_parts import NO_CLAIM, Errors, Fits, error_unit, named, title_of
 
 PACKAGE = "diagnosis.report"
 PLOTLY = "plotly-basic.min.js"  # npm: plotly.js-basic-dist-min, of the version that the plotly of Python brings
 SHOWN_RANKS, MOST_RANKS, MOST_LEARNT = 10, 300, 6
-DISTRESS = 2.0  # standard deviations of a prior
 BAR_SD = 4.0  # at the end of a bar
 
 
@@ -35,7 +34,11 @@ def page(diagnosis: Diagnosis) -> str:
         sentence=wording.sentence,
         clause=wording.clause,
         plain=wording.plain,
+        unit=wording.unit,
+        with_error=numbers.with_error,
+        drawn=equation.drawn,
     )
+    known = (*diagnosis.network.parameters, *(p for term in diagnosis.shapes for p in term.parameters))
     farthest_first = sorted(diagnosis.calibration, key=lambda one: -abs(one.shift_in_sd))
     return environment.from_string(_text("report.html.j2")).render(
         d=diagnosis,
@@ -46,25 +49,24 @@ def page(diagnosis: Diagnosis) -> str:
         words=wording.WORDS,
         claims=diagnosis.verdict not in NO_CLAIM,
         evidence=_evidence(diagnosis),
-        items=[(wording.plain(title_of(item)), [_finding(finding) for finding in item]) for item in diagnosis.items],
         stages=course_charts.stages_of(diagnosis),
         told=network_chart.marks(diagnosis).told(network_chart.corrected(diagnosis)),
         fits=[(title, _rows(fits, diagnosis.faulty), fits.recordings if len(fits.recordings) > 1 else {})
               for title, fits in (("Held out", diagnosis.holdout), ("Learned from", diagnosis.train))],
-        learnt=[
-            {"description": size.description, "size": numbers.with_error(size.start, size.sd)}
-            for size in sorted((term.strength for term in diagnosis.learnt), key=lambda size: -size.start)[:MOST_LEARNT]
-        ],
-        calibration=[_calibrated(diagnosis, one) for one in farthest_first],
+        learnt=sorted((term.strength for term in diagnosis.learnt), key=lambda size: -size.start)[:MOST_LEARNT],
+        calibration=farthest_first,
+        descriptions={p.name: p.description for p in known},
+        shift_bar=_shift_bar,
         ranking=diagnosis.ranking[:MOST_RANKS],
         shown_ranks=SHOWN_RANKS,
         windows=wording.windows,
         headline=wording.headline,
         size_of=size_of,
         named=named,
+        title_of=title_of,
+        values_told=values_told,
         date_told=date_told,
         recordings=len({course.recording for course in diagnosis.courses}),
-        provenance=wording.provenance(diagnosis.inputs),
     )  # fmt: skip
 
 
@@ -96,24 +98,6 @@ def _evidence(diagnosis: Diagnosis) -> dict[str, Any]:
     }
 
 
-def _finding(finding: Finding) -> dict[str, Any]:
-    """A finding as the template needs it."""
-    return {
-        "of": finding,
-        "title": wording.plain(finding.title),
-        "numbers": wording.plain(values_told(finding)),
-        "date": "" if finding.date is None else wording.clause(date_told(finding.date)),
-        "mean_heat": numbers.with_error(finding.heat_mean_W, finding.heat_stderr_W),
-        "equation": equation.drawn(finding.equation),
-        "parameters": [
-            (wording.name(p.name), numbers.with_error(p.value, p.stderr), wording.unit(p.unit))
-            for p in finding.parameters
-        ],
-        "rivals": [one for one in finding.confusable_with if one.instead],
-        "companions": [one for one in finding.confusable_with if not one.instead],
-    }
-
-
 def _rows(fits: Fits, faulty: Sequence[str]) -> list[tuple[str, str, Errors]]:
     """Sensor, unit and errors; nothing without recordings."""
     if not math.isfinite(fits.before):
@@ -123,17 +107,7 @@ def _rows(fits: Fits, faulty: Sequence[str]) -> list[tuple[str, str, Errors]]:
     return [(what, "K", total), *((c, error_unit(c), errors) for c, errors in fits.sensors.items())]
 
 
-def _calibrated(diagnosis: Diagnosis, one: Calibrated) -> dict[str, Any]:
-    known = (*diagnosis.network.parameters, *(p for term in diagnosis.shapes for p in term.parameters))
-    parameter = next((p for p in known if p.name == one.parameter), None)
-    shift = min(max(one.shift_in_sd, -BAR_SD), BAR_SD) if math.isfinite(one.shift_in_sd) else 0.0
-    return {
-        "of": one,
-        "value": numbers.with_error(one.value, one.stderr),
-        "estimate": numbers.with_error(one.estimate, one.estimate_stderr),
-        "unit": wording.unit(one.unit),
-        "description": parameter.description if parameter else "",
-        "left": 50.0 + 50.0 * min(shift, 0.0) / BAR_SD,
-        "width": 50.0 * abs(shift) / BAR_SD,
-        "distress": abs(one.shift_in_sd) > DISTRESS,
-    }
+def _shift_bar(shift_in_sd: float) -> tuple[float, float]:
+    """Where the bar of a shift begins, and how long it is, in percent of what it may take."""
+    shift = min(max(shift_in_sd, -BAR_SD), BAR_SD) if math.isfinite(shift_in_sd) else 0.0
+    return 50.0 + 50.0 * min(shift, 0.0) / BAR_SD, 50.0 * abs(shift) / BAR_SD

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from diagnosis.results.number_format import SUPERSCRIPTS
 from diagnosis.results.result_parts import PARAMETER, Finding
@@ -186,23 +185,3 @@ def windows(when: Sequence[tuple[str, float, float]]) -> list[tuple[str, str]]:
         more = f" and {len(every) - len(own)} shorter ones" if len(every) > len(own) else ""
         told.append((recording, f"{spans} {symbol}{more}"))
     return told
-
-
-def provenance(inputs: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Names and values of what a diagnosis was made from; nested ones one by one.
-
-    Examples
-    --------
-    >>> provenance({"version": "0.1", "recordings": {"a.csv": "12ab"}})
-    [('version', '0.1'), ('recordings: a.csv', '12ab')]
-    """
-    rows: list[tuple[str, str]] = []
-    for key, value in inputs.items():
-        label = str(key).replace("_", " ")
-        if isinstance(value, Mapping):
-            rows += [(f"{label}: {inner}", str(one)) for inner, one in value.items()]
-        elif isinstance(value, list):
-            rows += [(label, str(one)) for one in value]
-        else:
-            rows.append((label, str(value)))
-    return rows

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -20,14 +19,14 @@ from diagnosis.forward.grid import too_short
 from diagnosis.forward.whitening import RandomHeat
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.advice import next_test
-from diagnosis.results.findings import change_of, estimates_of, finding_of, joint_estimate_of, switch_errors
+from diagnosis.results.findings import change_of, estimates_of, finding_of, joint_estimate_of, parameters_of
 from diagnosis.results.held_out import validate
 from diagnosis.results.instruments import sensors_and_inputs_of
 from diagnosis.results.locations import locations_of
 from diagnosis.results.mean_loss import mean_loss_of
 from diagnosis.results.notes import baseline_notes, limit_notes, ratio_notes
 from diagnosis.results.predicted_run import PredictedRun
-from diagnosis.results.predictions import Predicted
+from diagnosis.results.predictions import PredictingModel
 from diagnosis.results.result import Diagnosis, Verdict
 from diagnosis.results.result_parts import (
     NO_CLAIM,
@@ -44,7 +43,6 @@ from diagnosis.setup.inference_setup import InferenceSetup
 from diagnosis.setup.noise import HEAT_FRACTION, HEAT_TIME_S, PARAMETRIC_FRACTION, PARAMETRIC_K, WANDER
 from models.base.types import Array
 from models.base.version import project_version
-from models.network.laws import Parameter
 from models.terms.term import Term
 
 BADLY = 2.0  # times the size that matters, which a calibrated model may be off for a "consistent"
@@ -98,8 +96,8 @@ def assemble(
     """
     faulty = () if others is None else others.channels
     valid = validate(setup, experiment, posterior, answers, plain=plain, calibration=calibration, faulty=faulty)
-    posterior, best, final = valid.posterior, valid.best, valid.model.predicted.final
-    train, holdout = valid.model.train, valid.model.holdout
+    posterior, best, predicting = valid.posterior, valid.best, valid.model
+    final, train, holdout = predicting.final, predicting.train, predicting.holdout
     settings, known = posterior.settings, setup.known
     reported = _distinct([
         (answer, finding_of(answer, answer.best.fit or final, setup, posterior))
@@ -115,10 +113,10 @@ def assemble(
     verdict = verdict_of(posterior, [answer for answer, _ in reported], unseen, unfit=unfit, badly=badly)
     location = locations_of(setup, posterior) if posterior.detected or verdict in NO_CLAIM else ()
     inputs = setup.gearbox.network().inputs
-    most_probable = valid.model.best if others is None else others.posterior.nothing
+    most_probable = predicting.best if others is None else others.posterior.nothing
     believed = (most_probable.fit if most_probable else None) or calibration.fit
-    runs = valid.model.predicted.train
-    effects = valid.model.best.effects if valid.model.best else ()
+    runs = predicting.train_runs
+    effects = predicting.best.effects if predicting.best else ()
     model = _calibrated(final, (runs["after"], runs["before"]), believed, plain, inputs, effects)
     return Diagnosis(
         verdict=verdict,
@@ -132,7 +130,7 @@ def assemble(
         train=train,
         holdout=holdout,
         faulty=faulty,
-        terms=_terms(valid.model.best, final),
+        terms=_terms(predicting.best, final),
         known=known,
         alone=_calibrated(plain, (runs["calibrated"], runs["before"]), calibration.fit, plain, inputs),
         joint=joint_estimate_of(final),
@@ -152,11 +150,11 @@ def assemble(
             setup, verdict, findings, location if posterior.detected else (), unseen,
             calibration=model.calibration, missed=holdout.far_beyond(train, settings.matters_K),
         ),
-        courses=_courses(setup, valid.model.predicted),
+        courses=_courses(setup, predicting),
         network=setup.nominal,
         shapes=setup.shapes,
-        learnt=valid.model.predicted.learnt,
-        left_out_K=valid.model.predicted.left_out_K,
+        learnt=predicting.learnt,
+        left_out_K=predicting.left_out_K,
         inputs=_provenance(setup),
         notes=(
             *ratio_notes(final), *limit_notes(final), *baseline_notes(experiment, posterior, valid.answers),
@@ -211,15 +209,12 @@ def _terms(best: Judged | None, final: Fit) -> tuple[Term, ...]:
     """Terms of the fit that predicts, with its values and standard errors."""
     if best is None or best.fit is None:
         return ()
-    found = estimates_of(final)
-    terms = [effect.term for effect in best.effects if effect.term is not None]
-    more = {name: error for term in terms for name, error in switch_errors(final, term).items()}
-
-    def as_found(p: Parameter) -> Parameter:
-        value, error = found.get(p.name, (p.start, 0.0))
-        return replace(p, start=value, sd=math.hypot(error, more.get(p.name, 0.0)))
-
-    return tuple(replace(term, parameters=tuple(map(as_found, term.parameters))) for term in terms)
+    found = [(effect.term, parameters_of(final, effect.term)) for effect in best.effects if effect.term is not None]
+    return tuple(
+        replace(term, parameters=tuple(
+            replace(p, start=values[p.name][0], sd=values[p.name][1]) for p in term.parameters
+        )) for term, values in found
+    )  # fmt: skip
 
 
 def _distinct(found: Sequence[tuple[Answer, Finding]]) -> list[tuple[Answer, Finding]]:
@@ -326,12 +321,12 @@ def _floor(setup: InferenceSetup, factors: RandomHeat) -> str:
 # ---------------------------------------------------------------------- fits and courses
 
 
-def _courses(setup: InferenceSetup, predicted: Predicted) -> tuple[PredictedRun, ...]:
+def _courses(setup: InferenceSetup, predicting: PredictingModel) -> tuple[PredictedRun, ...]:
     def by_channel(values: Array) -> dict[str, Array]:
         return {name: values[:, i] for i, name in enumerate(setup.channels)}
 
     result, parts = [], [part.name for part in setup.nominal.parts]
-    for held_out, states in ((False, predicted.train), (True, predicted.holdout)):
+    for held_out, states in ((False, predicting.train_runs), (True, predicting.holdout_runs)):
         for before, calibrated, after in zip(states["before"], states["calibrated"], states["after"], strict=True):
             piece = before.piece
             at = np.clip(np.arange(len(piece.time)), 0, len(piece.steps) - 1)

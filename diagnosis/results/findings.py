@@ -181,22 +181,26 @@ def names_of(effect: Hypothesis) -> tuple[str, ...]:
     return (effect.place,) if effect.term is None else tuple(p.name for p in effect.term.parameters)
 
 
+def parameters_of(fit: Fit, term: Term) -> Values:
+    """Value and standard error of every parameter of a term; of one that is not an unknown, its start and 0."""
+    known, switches = estimates_of(fit), switch_errors(fit, term)
+    found = {p.name: known.get(p.name, (p.start, 0.0)) for p in term.parameters}
+    return {name: (value, math.hypot(error, switches.get(name, 0.0))) for name, (value, error) in found.items()}
+
+
 def values_of(fit: Fit, effect: Hypothesis) -> Values:
-    """Value and standard error of every parameter of an effect; of one that is not an unknown, its start and 0.
+    """Value and standard error of every parameter of an effect, or of the one outside its prior that it is.
 
     A law's strength includes the error of its form; the constant bias of a sensor includes what was calibrated of it.
     """
-    found = {} if effect.term is None else {p.name: (p.start, 0.0) for p in effect.term.parameters}
-    found |= {name: known for name, known in estimates_of(fit).items() if name in names_of(effect)}
-    if effect.term is None:
-        return found
-    name = effect.term.strength.name
-    for parameter, error in switch_errors(fit, effect.term).items():
-        found[parameter] = (found[parameter][0], math.hypot(found[parameter][1], error))
-    if not effect.term.of_measurement:
+    term = effect.term
+    if term is None:
+        return {effect.place: estimates_of(fit)[effect.place]}
+    found, name = parameters_of(fit, term), term.strength.name
+    if not term.of_measurement:
         value, error = found[name]
         return {**found, name: (value, math.hypot(error, FORM_ERROR * value))}
-    return {**found, name: _whole_bias(fit, effect.term)} if _is_bias(effect.term) else found
+    return {**found, name: _whole_bias(fit, term)} if _is_bias(term) else found
 
 
 def switch_errors(fit: Fit, term: Term) -> dict[str, float]:
@@ -255,7 +259,7 @@ def heats_of(fit: Fit, effect: Hypothesis) -> list[Array]:
     """Heat of an effect over the intervals of every piece, summed over the parts it warms, [W]; none of a fault."""
     if not effect.in_network:
         return []
-    values = np.array([[values_of(fit, effect)[name][0] for name in names_of(effect)]])
+    values = np.array([[value for value, _ in values_of(fit, effect).values()]])
     return [heat[:, 0] for heat in _heats_with(fit, effect, values)]
 
 

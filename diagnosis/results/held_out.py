@@ -2,44 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-
-import numpy as np
 
 from diagnosis.decision.answer import Answer, decide, withdraw_claim
 from diagnosis.decision.posterior import Judged, Posterior
 from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.fit import Experiment, Fit
-from diagnosis.engine.predict import overall_rmse, rmse
 from diagnosis.engine.prepare import held_out_experiment
 from diagnosis.engine.switch_grid import switch_numbers
 from diagnosis.engine.to_predict import refit_to_predict
 from diagnosis.forward.whitening import RandomHeat
-from diagnosis.results.predictions import Predicted, Predictions, predict_recordings, temperatures
-from diagnosis.results.result_parts import MODELS, Errors, Fits, Refuted, named
+from diagnosis.results.predictions import PredictingModel, predict_recordings
+from diagnosis.results.result_parts import Fits, Refuted, named
 from diagnosis.setup.inference_setup import InferenceSetup
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class PredictingModel:
-    """A model that predicts all recordings.
-
-    Attributes
-    ----------
-    best : Judged or None
-        The explanation in it; None: the machine as calibrated
-    predicted : Predicted
-    train, holdout : Fits
-    contradicted : bool
-        True if the held-out recordings contradict the explanation
-    """
-
-    best: Judged | None
-    predicted: Predicted
-    train: Fits
-    holdout: Fits
-    contradicted: bool
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -93,35 +69,38 @@ def validate(
     held_out = held_out_experiment(setup, experiment).with_random_heat(RandomHeat(draught=draught))
 
     def model_with(best: Judged | None) -> PredictingModel:
-        predicted = predict_recordings(
-            experiment, held_out, plain=plain, found=_final(best, plain, faulty),
-            explanation=None if faulty else best or posterior.nothing, near=calibration.near, counting=counting,
+        return predict_recordings(
+            experiment, held_out, plain=plain, found=_final(best, plain, faulty), best=best,
+            written_into=None if faulty else best or posterior.nothing, near=calibration.near, counting=counting,
             noise_K=setup.noise_K,
         )  # fmt: skip
-        train, holdout = (_fits(setup, one, counting) for one in (predicted.train, predicted.holdout))
-        contradicted = holdout.contradict(predicted.holdout_gain, setup.noise_K, posterior.class_threshold)
-        if best is not None and best.error_class.is_large and all(one.how == "always" for one in best.effects):
-            contradicted |= predicted.holdout_gain < posterior.rule.confirmed
-        contradicted |= best is not None and _switches_for_nothing(best, holdout)
-        return PredictingModel(best=best, predicted=predicted, train=train, holdout=holdout,
-                               contradicted=contradicted and not faulty)  # fmt: skip
+
+    def contradict(one: PredictingModel) -> bool:
+        """True if the held-out recordings contradict what is in a model."""
+        best, gain = one.best, one.holdout_gain
+        unconfirmed = best is not None and (
+            (best.error_class.is_large and all(effect.how == "always" for effect in best.effects)
+             and gain < posterior.rule.confirmed)
+            or _switches_for_nothing(best, one.holdout)
+        )  # fmt: skip
+        return not faulty and (unconfirmed or one.holdout.contradict(gain, setup.noise_K, posterior.class_threshold))
 
     model, without_second, refuted = model_with(_best(posterior, answers)), False, None
-    if model.contradicted and model.best is not None and len(model.best.effects) == 2:
+    if contradict(model) and model.best is not None and len(model.best.effects) == 2:
         # A second effect that the held-out recordings contradict takes nothing back from the first one.
         singles = replace(posterior, judged=tuple(one for one in posterior.judged if len(one.effects) == 1))
         alone = decide(singles)
         first = model_with(_best(singles, alone))
-        if first.predicted.holdout_gain > model.predicted.holdout_gain:
-            posterior, answers, model, without_second = singles, alone, first, not first.contradicted
-    both = posterior.log_e + model.predicted.holdout_gain
+        if first.holdout_gain > model.holdout_gain:
+            posterior, answers, model, without_second = singles, alone, first, not contradict(first)
+    both = posterior.log_e + model.holdout_gain
     if model.best is not None and posterior.detected and both < posterior.threshold and not faulty:
         names = " and ".join(named(effect.mechanism, effect.place) for effect in model.best.effects)
-        refuted = Refuted(names=names, log_e_value=posterior.log_e, log_score_gain=model.predicted.holdout_gain)
+        refuted = Refuted(names=names, log_e_value=posterior.log_e, log_score_gain=model.holdout_gain)
         posterior = replace(posterior, log_e=both)
         answers, without_second = decide(posterior), False
         model = model_with(_best(posterior, answers))
-    best, gain, contradicted = model.best, model.predicted.holdout_gain, model.contradicted and bool(answers)
+    best, gain, contradicted = model.best, model.holdout_gain, contradict(model) and bool(answers)
     if contradicted:
         answers = [withdraw_claim(answer, posterior.rule) for answer in answers]
     if contradicted and model.holdout.after > model.holdout.calibrated:
@@ -158,24 +137,3 @@ def _final(best: Judged | None, plain: Fit, faulty: Sequence[str]) -> Fit:
         return refit_to_predict(first, plain, faulty)
     except ArithmeticError:  # no solution without what model error allows
         return first
-
-
-def _fits(setup: InferenceSetup, predictions: Predictions, counting: Collection[str]) -> Fits:
-    columns = temperatures(setup.channels, counting)
-    nothing = [np.zeros((0, len(setup.channels)))]
-    each = {
-        state: rmse(np.concatenate([p.residual for p in found] or nothing),
-                    np.concatenate([p.weights for p in found] or [np.zeros(0)]))
-        for state, found in predictions.items()
-    }  # fmt: skip
-    overall = {state: overall_rmse(found, columns) for state, found in predictions.items()}
-
-    def alone(recording: str, state: str) -> float:
-        return overall_rmse([p for p in predictions[state] if p.piece.recording == recording], columns)
-
-    recordings = {
-        name: Errors(*(alone(name, model) for model in MODELS))
-        for name in dict.fromkeys(p.piece.recording for p in predictions["before"])
-    }
-    sensors = {name: Errors(*(float(each[model][i]) for model in MODELS)) for i, name in enumerate(setup.channels)}
-    return Fits(**overall, sensors=sensors, recordings=recordings)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.answer import Answer
-from diagnosis.decision.posterior import Placebo, Posterior
+from diagnosis.decision.posterior import Posterior
 from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.scale import scale_direction
 from diagnosis.engine.scan import scan, scope_of
@@ -21,22 +21,43 @@ AT_LIMIT = 1e-6  # of a value, from a limit
 LITTLE = 0.01  # of what the recordings know about the sizes one by one: a small part of fixed capacity pretends so much
 
 
-def baseline_notes(experiment: Experiment, posterior: Posterior, answers: Sequence[Answer]) -> tuple[str, ...]:
-    """Notes on baselines in which the effect acts too, or that look like another machine."""
+def baseline_notes(experiment: Experiment, posterior: Posterior, answers: Sequence[Answer]) -> Iterator[str]:
+    """Notes on baselines in which the effect acts too, or that look like another machine, or that bring evidence."""
     nothing = posterior.nothing.fit
     if not experiment.healthy or nothing is None:
-        return ()
-    found = (answer.effect for answer in answers[:1] if answer.effect.term is not None)
-    effect = next((one for one in found if scope_of(experiment, one) is not None), None)  # else it may act in them
-    best = (answers[0].best.fit if answers else None) or nothing
-    single = [one for one in posterior.judged if len(one.effects) == 1]
-    ahead = max(single, key=lambda one: one.weight + one.effects[0].less, default=None)
+        return
+    for effect in (answer.effect for answer in answers[:1] if answer.effect.term is not None):
+        if scope_of(experiment, effect) is None:
+            continue  # it may act in them
+        acting = evidence_in_baselines(nothing, effect)
+        if acting > NOTED_FROM:
+            yield (
+                f"The baselines show {effect.name} too (evidence {acting:.0f} nat): the reported size is only its "
+                "growth since then. Take baselines from before it began, or leave them out."
+            )
+    for session, nats in sessions_apart((answers[0].best.fit if answers else None) or nothing).items():
+        if nats > NOTED_FROM:
+            yield (
+                f"Session '{session}' looks like another machine, or one that was rebuilt (evidence {nats:.0f} nat): "
+                "its parameters are not those of the other recordings. Leave it out if that is so."
+            )
     placebo = posterior.assumed.placebo
-    raised = placebo is not None and posterior.threshold == placebo.log_e_value
-    return baselines_told(0.0 if effect is None else evidence_in_baselines(nothing, effect), sessions_apart(best),
-                          "" if effect is None else effect.name,
-                          placebo if raised else None, ahead.effects[0] if ahead else None,
-                          posterior.class_threshold)  # fmt: skip
+    if placebo is not None and posterior.threshold == placebo.log_e_value:
+        yield (
+            f"In the baseline '{placebo.session}' nothing is wrong, but the same test finds "
+            f"{placebo.log_e_value:.0f} nat in it ({placebo.mechanism} at {placebo.place}; for as many hours as are "
+            "tested). So much is model error: the recordings have to bring more. If that effect may have acted there, "
+            "leave the session out."
+        )
+    single = [one for one in posterior.judged if len(one.effects) == 1]
+    if not single:
+        return
+    ahead = max(single, key=lambda one: one.weight + one.effects[0].less).effects[0]  # if baselines took nothing of it
+    if ahead.less > posterior.class_threshold:
+        yield (
+            f"A baseline, in which nothing changed, seems to show {ahead.name} as well: {ahead.less:.0f} nat of it "
+            "(for as many hours as are tested) do not count. If it may have changed there, leave the session out."
+        )
 
 
 def evidence_in_baselines(fit: Fit, effect: Hypothesis) -> float:
@@ -50,57 +71,6 @@ def evidence_in_baselines(fit: Fit, effect: Hypothesis) -> float:
     alone = fit.part(fit.experiment.baselines)
     everywhere = replace(alone, experiment=replace(alone.experiment, healthy=frozenset()))
     return float(scan(everywhere, [effect]).log_bayes[0])
-
-
-def baselines_told(
-    acting: float,
-    apart: Mapping[str, float],
-    effect: str = "",
-    placebo: Placebo | None = None,
-    ahead: Hypothesis | None = None,
-    counts_from: float = NOTED_FROM,
-) -> tuple[str, ...]:
-    """Notes for a report on baselines that are not as they should be.
-
-    Parameters
-    ----------
-    acting : float
-        Evidence in the baselines for the effect that is reported, see :func:`evidence_in_baselines`, [nat]
-    apart : mapping of session to float
-        See :func:`sessions_apart`, [nat]
-    effect : str
-        Its name for people
-    placebo : Placebo or None
-        Where it raises what the recordings have to bring
-    ahead : Hypothesis or None
-        What would be ahead if baselines took nothing from it
-    counts_from : float
-        What they may bring of it by chance, [nat]
-    """
-    notes = []
-    if effect and acting > NOTED_FROM:
-        notes.append(
-            f"The baselines show {effect} too (evidence {acting:.0f} nat): the reported size is only its growth since "
-            "then. Take baselines from before it began, or leave them out."
-        )
-    notes += [
-        f"Session '{session}' looks like another machine, or one that was rebuilt (evidence {nats:.0f} nat): its "
-        "parameters are not those of the other recordings. Leave it out if that is so."
-        for session, nats in apart.items() if nats > NOTED_FROM
-    ]  # fmt: skip
-    if placebo is not None:
-        notes.append(
-            f"In the baseline '{placebo.session}' nothing is wrong, but the same test finds "
-            f"{placebo.log_e_value:.0f} nat in it ({placebo.mechanism} at {placebo.place}; for as many hours as are "
-            "tested). So much is model error: the recordings have to bring more. If that effect may have acted there, "
-            "leave the session out."
-        )
-    if ahead is not None and ahead.less > counts_from:
-        notes.append(
-            f"A baseline, in which nothing changed, seems to show {ahead.name} as well: {ahead.less:.0f} nat of it "
-            "(for as many hours as are tested) do not count. If it may have changed there, leave the session out."
-        )
-    return tuple(notes)
 
 
 def limit_notes(fit: Fit) -> tuple[str, ...]:

@@ -11,8 +11,9 @@ from diagnosis.decision.posterior import Judged
 from diagnosis.engine.calibration import NearReadings
 from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.learnt_error import is_writable, with_learnt_error
-from diagnosis.engine.predict import Prediction, log_score_gain, overall_rmse, predict, with_pieces_of
+from diagnosis.engine.predict import Prediction, log_score_gain, overall_rmse, predict, rmse, with_pieces_of
 from diagnosis.engine.set_apart import without_channels
+from diagnosis.results.result_parts import MODELS, Errors, Fits
 from models.base.types import Array
 from models.quantities.quantities import is_total_loss
 from models.terms.term import Term
@@ -21,36 +22,42 @@ Predictions = dict[str, Sequence[Prediction]]  # of all pieces: before, calibrat
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Predicted:
-    """Readings that the recordings to learn from and those held out should have shown.
+class PredictingModel:
+    """A model, and its free-running predictions of all recordings.
 
     Attributes
     ----------
-    train, holdout : mapping of state to predictions
-        ``before``: as delivered; ``calibrated``: without model error; ``found``: with the findings; ``after``:
-        corrected, with what was learnt of model error too where that helps
+    best : Judged or None
+        The explanation in it; None: the machine as calibrated
     final : Fit
-        Of the corrected model
     learnt : tuple of Term
-        What was learnt of model error and is in the corrected model
+        What was learnt of model error and is in it
     left_out_K : float
         Error of the held-out temperatures with what was learnt, where it is left out for that; else NaN
+    train_runs, holdout_runs : mapping of state to predictions
+        ``before``: as delivered; ``calibrated``: without model error; ``found``: with the findings; ``after``:
+        corrected, with what was learnt of model error too where that helps
+    train, holdout : Fits
+        Their errors
     holdout_gain : float
-        Log score of the corrected model on the held-out readings, less that of the calibrated one, [nat]
+        Log score of it on the held-out readings, less that of the calibrated machine, [nat]
     """
 
-    train: Predictions
-    holdout: Predictions
+    best: Judged | None
     final: Fit
     learnt: tuple[Term, ...]
     left_out_K: float
+    train_runs: Predictions
+    holdout_runs: Predictions
+    train: Fits
+    holdout: Fits
     holdout_gain: float
 
 
 def predict_recordings(
-    experiment: Experiment, judged: Experiment, *, plain: Fit, found: Fit, explanation: Judged | None,
-    near: NearReadings, counting: Collection[str], noise_K: float,
-) -> Predicted:  # fmt: skip
+    experiment: Experiment, judged: Experiment, *, plain: Fit, found: Fit, best: Judged | None,
+    written_into: Judged | None, near: NearReadings, counting: Collection[str], noise_K: float,
+) -> PredictingModel:  # fmt: skip
     """Predict all recordings, with model error written into the best explanation if that helps.
 
     Parameters
@@ -59,7 +66,9 @@ def predict_recordings(
         With the pieces to learn from, and those held out
     plain, found : Fit
         The nominal machine, and that with the findings, both calibrated without model error
-    explanation : Judged or None
+    best : Judged or None
+        The explanation in `found`
+    written_into : Judged or None
         What model error may be written into; None: nothing, since it would stand in for a broken sensor
     near : NearReadings
         Where model error was linearised
@@ -77,15 +86,15 @@ def predict_recordings(
     holdout = _states(judged, plain, found)
     final, learnt, left_out_K = found, tuple[Term, ...](), float("nan")
     after = [train["found"], holdout["found"]]
-    if explanation is not None and explanation.fit is not None:
+    if written_into is not None and written_into.fit is not None:
         try:
-            if is_writable(explanation.error_class):
-                written, terms = with_learnt_error(explanation.fit, near, explanation.error_class)
+            if is_writable(written_into.error_class):
+                written, terms = with_learnt_error(written_into.fit, near, written_into.error_class)
                 there: list[Sequence[Prediction]] = [
                     _predictions(written, one, _courses(known))
                     for one, known in zip((experiment, judged), after, strict=True)
                 ]  # fmt: skip
-                columns = temperatures(experiment.pieces[0].channels, counting)
+                columns = _temperatures(experiment.pieces[0].channels, counting)
                 # Far from a straight line it may do harm: parameters at limits and large factors go together.
                 farther = [overall_rmse(with_it, columns) - overall_rmse(without, columns)
                            for with_it, without in zip(there, after, strict=True)]  # fmt: skip
@@ -96,14 +105,17 @@ def predict_recordings(
         except ArithmeticError:
             pass  # no solution with what was learnt
     train["after"], holdout["after"] = after
-    faulty = set(experiment.pieces[0].channels) - set(counting)
+    channels = experiment.pieces[0].channels
+    faulty = set(channels) - set(counting)
     runs = holdout["after"], holdout["calibrated"]
     gain = log_score_gain(final, plain, without_channels(judged, faulty), runs)
-    return Predicted(train=train, holdout=holdout, final=final, learnt=learnt, left_out_K=left_out_K,
-                     holdout_gain=gain)  # fmt: skip
+    return PredictingModel(
+        best=best, final=final, learnt=learnt, left_out_K=left_out_K, train_runs=train, holdout_runs=holdout,
+        train=_fits(channels, train, counting), holdout=_fits(channels, holdout, counting), holdout_gain=gain,
+    )  # fmt: skip
 
 
-def temperatures(channels: Sequence[str], counting: Collection[str]) -> list[int]:
+def _temperatures(channels: Sequence[str], counting: Collection[str]) -> list[int]:
     """Indices of the channels that are temperatures and count."""
     return [i for i, name in enumerate(channels) if not is_total_loss(name) and name in counting]
 
@@ -129,3 +141,24 @@ def _predictions(
 
 def _courses(found: Sequence[Prediction]) -> list[Array]:
     return [one.trajectory.T for one in found]
+
+
+def _fits(channels: Sequence[str], predictions: Predictions, counting: Collection[str]) -> Fits:
+    columns = _temperatures(channels, counting)
+    nothing = [np.zeros((0, len(channels)))]
+    each = {
+        state: rmse(np.concatenate([p.residual for p in found] or nothing),
+                    np.concatenate([p.weights for p in found] or [np.zeros(0)]))
+        for state, found in predictions.items()
+    }  # fmt: skip
+    overall = {state: overall_rmse(found, columns) for state, found in predictions.items()}
+
+    def alone(recording: str, state: str) -> float:
+        return overall_rmse([p for p in predictions[state] if p.piece.recording == recording], columns)
+
+    recordings = {
+        name: Errors(*(alone(name, model) for model in MODELS))
+        for name in dict.fromkeys(p.piece.recording for p in predictions["before"])
+    }
+    sensors = {name: Errors(*(float(each[model][i]) for model in MODELS)) for i, name in enumerate(channels)}
+    return Fits(**overall, sensors=sensors, recordings=recordings)

@@ -221,7 +221,8 @@ def _diagnosis(**given: object) -> Diagnosis:
         "next_test": "",
         "network": NETWORK,
         "shapes": SHAPES,
-        "inputs": {"gearbox": "3f7a" * 16, "recordings": ["9b1c" * 16, "04de" * 16], "version": "0.1.0"},
+        "inputs": {"recordings": {"train_1": "9b1c" * 16}, "held_out": {"hold_1": "04de" * 16},
+                   "switched_off": ["windage"], "gearbox": "3f7a" * 16, "version": "0.1.0"},
         "notes": ("train_1: 14 outliers of bearing_3 removed (rows 120, 688, ...)",),
     }  # fmt: skip
     return Diagnosis(**(usual | given))  # type: ignore[arg-type]

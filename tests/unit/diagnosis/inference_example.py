@@ -28,12 +28,18 @@ NODES = ("oil", "housing_lower", "bearing_1", "pinion")
 
 
 def recording_of(columns: dict[str, Array], channels: dict[str, Array]) -> Recording:
-    time = columns["time_s"]
+    return recording_with(columns["time_s"], channels, speed=columns["speed_rpm"], torque=columns["torque_Nm"],
+                  T_ambient=columns["T_ambient_degC"])  # fmt: skip
+
+
+def recording_with(time: Array, channels: Mapping[str, Array] | None = None, **inputs: Array | float) -> Recording:
+    """A recording without gaps, of inputs that may be constant; by default at rest, in air of 22 degC and 2 m/s."""
+    given = {"speed": 0.0, "torque": 0.0, "T_ambient": 22.0, "air_speed": 2.0} | inputs
     return Recording(
         name="made", path=Path("made.csv"), time=time,
-        inputs={"speed": columns["speed_rpm"], "torque": columns["torque_Nm"], "T_ambient": columns["T_ambient_degC"],
-                "air_speed": np.full(len(time), 2.0)},
-        channels=tuple(Channel(name=n, values=v) for n, v in channels.items()), segments=(slice(0, len(time)),),
+        inputs={name: np.broadcast_to(np.asarray(values, float), time.shape) for name, values in given.items()},
+        channels=tuple(Channel(name=n, values=v) for n, v in (channels or {}).items()),
+        segments=(slice(0, len(time)),),
     )  # fmt: skip
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,14 +15,13 @@ from diagnosis.forward.grid import Piece, pieces
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.recurrence import lagged, recurrence
 from diagnosis.forward.trajectory import parameter_heat, simulate
-from diagnosis.recordings.recording import Recording
 from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.types import Array
 from models.files.cycle import Cycle
 from models.mechanisms import CATALOGUE, Placed, Scale
 from models.network.laws import symbol
 from models.simulation.thermal_network import ExtraState
-from tests.unit.diagnosis.inference_example import named_values
+from tests.unit.diagnosis.inference_example import named_values, recording_with
 
 INPUTS = ("speed", "torque", "T_ambient", "air_speed")
 FZG = load_gearbox("fzg")
@@ -31,13 +29,7 @@ REMEMBERING = sorted(name for name, m in CATALOGUE.items() if m.states and m.pla
 
 
 def piece_of(time: Array, *, speed: Array | float = 2600.0, torque: float = 150.0) -> Piece:
-    inputs = {"speed": speed, "torque": torque, "T_ambient": 22.0, "air_speed": 2.0}
-    recording = Recording(
-        name="made", path=Path("made.csv"), sha256="0" * 64, time=time, channels=(),
-        inputs={name: np.broadcast_to(np.asarray(values, float), time.shape) for name, values in inputs.items()},
-        segments=(slice(0, len(time)),),
-    )  # fmt: skip
-    (found,) = pieces([recording], INPUTS, (), even=True)
+    (found,) = pieces([recording_with(time, speed=speed, torque=torque)], INPUTS, (), even=True)
     return found
 
 

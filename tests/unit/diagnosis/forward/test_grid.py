@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,10 +11,11 @@ from diagnosis.forward.free_running import free_running
 from diagnosis.forward.grid import FREE_S, INTERVAL_S, LONGEST, SAMPLES, Piece, pieces, stands_for, too_short, white_sd
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.recurrence import lagged
-from diagnosis.recordings.recording import Channel, Recording
+from diagnosis.recordings.recording import Recording
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 from models.mechanisms import CATALOGUE, Scale
+from tests.unit.diagnosis.inference_example import recording_with
 
 INPUTS = ("speed", "torque", "T_ambient", "air_speed")
 TIME = np.arange(0.0, 7201.0, 10.0)
@@ -23,13 +23,7 @@ COARSE = LONGEST * INTERVAL_S
 
 
 def recorded(time: Array, speed: Array | float = 1500.0, oil: Array | None = None) -> Recording:
-    inputs = {"speed": speed, "torque": 120.0, "T_ambient": 22.0, "air_speed": 2.0}
-    channels = () if oil is None else (Channel(name="oil", values=oil),)
-    return Recording(
-        name="made", path=Path("made.csv"), sha256="0" * 64, time=time, channels=channels,
-        inputs={name: np.broadcast_to(np.asarray(values, float), time.shape) for name, values in inputs.items()},
-        segments=(slice(0, len(time)),),
-    )  # fmt: skip
+    return recording_with(time, {} if oil is None else {"oil": oil}, speed=speed, torque=120.0)
 
 
 def piece_of(

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import sympy as sp
 
-from diagnosis.forward.sensor_fault import columns_as_recorded
+from diagnosis.forward.recorder import read_as_recorded
+from models.correction.correction import Correction, Finding
 from models.network.laws import Parameter
 from models.terms.term import Form, Term
 
@@ -60,7 +63,9 @@ def fault(form: Form, *target: str, law: str, size: float) -> Term:
     ],
 )
 def test_readings_of_a_faulty_sensor(terms: list[Term], expected: dict[str, np.ndarray]) -> None:
-    found = columns_as_recorded(COLUMNS, terms)
+    findings = [Finding.of(replace(term, label=f"fault_{i}"), {"size": (term.strength.start, 0.0)}, mechanism="fault")
+                for i, term in enumerate(terms)]  # fmt: skip
+    found = read_as_recorded(COLUMNS, Correction(finding=tuple(findings)))
     assert found.keys() == expected.keys()
     for name, values in expected.items():
         np.testing.assert_allclose(found[name], values, atol=1e-9)

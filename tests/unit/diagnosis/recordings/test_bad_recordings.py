@@ -14,16 +14,10 @@ import pytest
 
 from builder.__main__ import main
 from diagnosis.recordings.read import read_recordings
-from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError
 from models.simulation.thermal_network import ThermalNetwork
 
 ROWS = 60
-
-
-@pytest.fixture(scope="module")
-def network(fzg: Gearbox) -> ThermalNetwork:
-    return fzg.network()
 
 
 def sound() -> pd.DataFrame:

@@ -12,7 +12,6 @@ import pytest
 from diagnosis.recordings.read import read_recordings
 from diagnosis.recordings.recording import Recording
 from diagnosis.recordings.time_axis import Clock, inside, part_of
-from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError
 from models.simulation.thermal_network import ThermalNetwork
 
@@ -61,11 +60,6 @@ def test_a_part_without_a_zone_has_that_of_the_clock() -> None:
 
 
 # ---------------------------------------------------------------------- from files
-
-
-@pytest.fixture(scope="module")
-def network(fzg: Gearbox) -> ThermalNetwork:
-    return fzg.network()
 
 
 def table(rows: int = 200) -> pd.DataFrame:

@@ -13,18 +13,12 @@ import pytest
 from diagnosis.recordings.read import read_recordings
 from diagnosis.recordings.recording import Recording
 from diagnosis.recordings.shared_rows import check_shared_rows
-from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError
 from models.simulation.thermal_network import ThermalNetwork
 
 ROWS = 120
 HEADER = "time_s,speed_rpm,torque_Nm,T_oil_degC,P_loss_W"
 GERMAN = 'csv = { separator = ";", decimal = "," }\n'
-
-
-@pytest.fixture(scope="module")
-def network(fzg: Gearbox) -> ThermalNetwork:
-    return fzg.network()
 
 
 def table() -> pd.DataFrame:

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from diagnosis.recordings.mdf import _named_apart, _on_rows_of
+from diagnosis.recordings.mdf import _on_rows_of, read_mdf
 from diagnosis.recordings.read import read_recordings
 from models.assembly.gearbox import load_gearbox
 from models.base.errors import InputError
@@ -61,8 +61,14 @@ def test_a_machine_without_a_shaft_is_read_as_its_table_is(tmp_path: Path) -> No
         np.testing.assert_array_equal(mine.values, other.values)
 
 
-def test_a_channel_that_several_groups_have_is_named_with_its_group() -> None:
-    frames = [pd.DataFrame({"n": [1.0], "status": [0.0]}), pd.DataFrame({"T": [20.0], "status": [1.0]})]
-    groups, units = _named_apart(frames, [{"n": "rpm", "status": "-"}, {"T": "K", "status": ""}])
-    assert [list(frame.columns) for frame in groups] == [["n", "status (group 1)"], ["T", "status (group 2)"]]
-    assert units == [{"n": "rpm", "status (group 1)": "-"}, {"T": "K", "status (group 2)": ""}]
+def test_a_channel_that_several_groups_have_is_named_with_its_group(tmp_path: Path) -> None:
+    asammdf, time = pytest.importorskip("asammdf"), np.arange(0.0, 50.0, 10.0)
+    groups = {"n": "rpm", "status": "-"}, {"T": "K", "status": ""}
+    with asammdf.MDF(version="4.10") as mdf:
+        for units in groups:
+            mdf.append([asammdf.Signal(np.full(5, 20.0), time, name=name, unit=unit) for name, unit in units.items()])
+        mdf.save(tmp_path / "run.mf4")
+    table, units, _ = read_mdf(tmp_path / "run.mf4", bases=["n"])
+    assert list(table.columns) == ["time_s", "n", "status (group 1)", "T", "status (group 2)"]
+    assert units == {"n": "rpm", "status (group 1)": "-", "T": "K"}
+    np.testing.assert_array_equal(table["T"], 20.0)

@@ -15,15 +15,9 @@ from diagnosis.recordings.read import named_apart, read_by_role, read_recordings
 from diagnosis.recordings.recording import Recording
 from diagnosis.recordings.shared_rows import check_shared_rows
 from diagnosis.recordings.time_axis import part_of
-from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError
 from models.quantities.units import INSIDE, units_in_files
 from models.simulation.thermal_network import ThermalNetwork
-
-
-@pytest.fixture(scope="module")
-def network(fzg: Gearbox) -> ThermalNetwork:
-    return fzg.network()
 
 
 def table(rows: int = 200, step: float = 10.0, seed: int = 0) -> pd.DataFrame:

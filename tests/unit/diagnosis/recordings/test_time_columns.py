@@ -11,17 +11,11 @@ import pytest
 from diagnosis.recordings.date_forms import forms_of
 from diagnosis.recordings.read import read_recordings
 from diagnosis.recordings.recording import Recording
-from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError
 from models.simulation.thermal_network import ThermalNetwork
 
 TIME = 10.0 * np.arange(400)
 STAMPS = pd.Timestamp("2024-12-31 13:05:00") + pd.to_timedelta(TIME, unit="s")
-
-
-@pytest.fixture(scope="module")
-def network(fzg: Gearbox) -> ThermalNetwork:
-    return fzg.network()
 
 
 def read(folder: Path, network: ThermalNetwork, time: dict[str, object], mapping: str = "") -> Recording:

@@ -17,6 +17,7 @@ from markupsafe import escape
 
 from diagnosis.report import equation as equations
 from diagnosis.report import network_chart as drawing
+from diagnosis.report import network_layout
 from diagnosis.report.chart import Chart, averaged, curve_points, stretches, thinned
 from diagnosis.report.course_charts import _errors, _joined, errors_over_time, measured_and_simulated, recordings_of
 from diagnosis.report.finding_charts import dates_with_bands, driver_of, heat_of_findings, names_by_grade
@@ -147,6 +148,12 @@ def test_names_from_files_cannot_break_out_of_the_page() -> None:
     text = page(diagnosis)
     assert hostile not in text
     assert Text(text).faults == []
+
+
+def test_what_a_diagnosis_was_made_from_is_told_one_by_one(pages: dict[str, str]) -> None:
+    text = Text(pages["consistent"]).plain
+    assert (f"recordings: train_1 {'9b1c' * 16} held out: hold_1 {'04de' * 16} switched off windage gearbox "
+            f"{'3f7a' * 16} version 0.1.0") in text  # fmt: skip
 
 
 def test_pieces_of_one_recording_are_told_apart_and_counted_once() -> None:
@@ -387,6 +394,14 @@ def test_a_large_network_keeps_rows_that_a_phone_has_room_for() -> None:
     assert max(Counter(row for _, row in places.values()).values()) <= WIDEST_ROW
     names = drawing.drawn(network, network, (), drawing.Marks()).layout.annotations
     assert len(names) == len(network.nodes)
+
+
+def test_a_drawing_does_not_depend_on_the_order_in_a_set(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else a node changes its side from one run to the next where neighbours to both sides balance."""
+    middle, rng = network_layout._middle, np.random.default_rng(0)
+    monkeypatch.setattr(network_layout, "_middle", lambda at, own: middle(rng.permutation(at).tolist(), own))
+    first, *others = (places_of(NETWORK, NETWORK) for _ in range(30))
+    assert all(one == first for one in others)
 
 
 # ------------------------------------------------------------------ looks

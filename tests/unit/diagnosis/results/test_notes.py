@@ -2,42 +2,72 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+import pytest
 
 from diagnosis.candidates.hypotheses import Hypothesis
-from diagnosis.decision.posterior import Placebo
-from diagnosis.results.notes import baselines_told, limit_notes
-from tests.unit.diagnosis.results.assembled_example import Prepared
+from diagnosis.decision.answer import Answer
+from diagnosis.decision.posterior import Assumed, Judged, Placebo
+from diagnosis.results import notes
+from diagnosis.results.notes import limit_notes
+from tests.unit.diagnosis.results.assembled_example import Prepared, posterior_of
 
 
-def test_an_effect_that_acts_in_the_baselines_is_noted() -> None:
-    assert not baselines_told(2.0, {}, "a drift")
-    (note,) = baselines_told(20.0, {}, "a drift")
-    assert "show a drift too (evidence 20 nat)" in note
+@pytest.fixture
+def noted(
+    prepared: Prepared, windage: Judged, monkeypatch: pytest.MonkeyPatch
+) -> Callable[..., tuple[str, ...]]:  # fmt: skip
+    """Notes on a baseline, where windage is the answer."""
+    _, experiment, plain = prepared
+    answers = [Answer(best=windage, effect=windage.effects[0], grade="claim", probability=0.95, joint=0.95)]
+
+    def notes_of(
+        *judged: Judged, acting: float = 0.0, apart: Mapping[str, float] | None = None, threshold: float = 4.0,
+        **given: Any,
+    ) -> tuple[str, ...]:  # fmt: skip
+        monkeypatch.setattr(notes, "evidence_in_baselines", lambda *_: acting)
+        monkeypatch.setattr(notes, "sessions_apart", lambda _: dict(apart or {}))
+        posterior = replace(posterior_of(plain, *judged, **given), threshold=threshold)
+        return tuple(notes.baseline_notes(replace(experiment, healthy=frozenset({"april"})), posterior, answers))
+
+    return notes_of
 
 
-def test_a_session_of_another_machine_is_noted() -> None:
-    (note,) = baselines_told(0.0, {"april": 10.0, "may": -5.0})
+def test_an_effect_that_acts_in_the_baselines_is_noted(noted: Callable[..., tuple[str, ...]]) -> None:
+    assert not noted(acting=2.0)
+    (note,) = noted(acting=20.0)
+    assert "show windage too (evidence 20 nat)" in note
+
+
+def test_a_session_of_another_machine_is_noted(noted: Callable[..., tuple[str, ...]]) -> None:
+    (note,) = noted(apart={"april": 10.0, "may": -5.0})
     assert note.startswith("Session 'april' looks like another machine")
 
 
-def test_a_baseline_that_brings_evidence_is_noted() -> None:
+def test_a_baseline_that_brings_evidence_is_noted(noted: Callable[..., tuple[str, ...]]) -> None:
     damage = Placebo(session="april", log_e_value=50.6, mechanism="bearing_damage", place="bearing_1")
-    (note,) = baselines_told(0.0, {}, placebo=damage)
+    (note,) = noted(assumed=Assumed(placebo=damage), threshold=50.6)
     assert note.startswith(
         "In the baseline 'april' nothing is wrong, but the same test finds 51 nat in it (bearing_damage"
     )
+    assert not noted(assumed=Assumed(placebo=damage), threshold=60.0)  # that is not what it has to reach
 
 
-def test_what_a_baseline_takes_from_a_change_is_noted() -> None:
+def test_what_a_baseline_takes_from_a_change_is_noted(noted: Callable[..., tuple[str, ...]], windage: Judged) -> None:
     step = Hypothesis(name="air_cooling_step", place="air", family="heat", law="air_cooling",
                       variants=np.ones((1, 1)), how="from_date", less=95.0)  # fmt: skip
-    (note,) = baselines_told(0.0, {}, ahead=step)
+
+    def behind(taken: float) -> Judged:
+        return replace(windage, effects=(replace(step, less=taken),), log_bayes=20.0, fit=None)
+
+    (note,) = noted(windage, behind(95.0))
     assert note.startswith("A baseline, in which nothing changed, seems to show air_cooling_step as well: 95 nat of it")
-    assert baselines_told(0.0, {}, ahead=replace(step, less=4.0)) == ()
-    assert baselines_told(0.0, {}, ahead=step, counts_from=100.0) == ()  # as much comes by chance
+    assert noted(windage, behind(60.0)) == ()  # behind all the same
+    assert noted(behind(4.0)) == ()  # as much comes by chance
 
 
 def test_unknowns_at_their_limits_are_no_estimates(prepared: Prepared) -> None:
