@@ -281,7 +281,7 @@ def _how_much_better(d: Diagnosis) -> tuple[str, ...]:
             "measured loss would settle it"
         ) if loss.is_far else (
             ". Without a measured loss watts rest on the heat capacities of the definition: a mass that it lacks, as a "
-            "bed or a frame, makes them too few"
+            "bed or a frame, makes them too few (add FILE foundation_conduction)"
         ) if loss.moved else ""  # fmt: skip
         lines.append(
             f"Mean total loss, not measured: {with_error(loss.estimate_W, loss.stderr_W)} W estimated, "
