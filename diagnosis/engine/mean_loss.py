@@ -9,22 +9,20 @@ from diagnosis.engine.unknown import in_scope
 from models.base.types import Array
 
 
-def mean_loss(fit: Fit) -> tuple[float, Array]:
-    """Mean total loss over the tested recordings, and its slopes with temperatures as they are.
+def mean_loss(fit: Fit) -> float:
+    """Mean total loss over the tested recordings, [W]."""
+    is_loss, tested = fit.experiment.machine.model.is_loss, [fit.parts[i].point for i in fit.experiment.tested]
+    heat = sum(float(p.trajectory.piece.steps @ p.balance.sources[:, is_loss].sum(axis=-1)) for p in tested)
+    return heat / sum(float(p.trajectory.piece.steps.sum()) for p in tested)
 
-    Returns
-    -------
-    loss : float
-        [W]
-    slopes : Array, shape (unknowns,)
-        By ``z``, [W]
-    """
-    experiment, slopes, loss, duration = fit.experiment, np.zeros(len(fit.z)), 0.0, 0.0
-    for part in map(fit.parts.__getitem__, experiment.tested):
-        point, piece = part.point, part.point.trajectory.piece
+
+def mean_loss_slopes(fit: Fit) -> Array:
+    """Slopes of the mean total loss by ``z``, with temperatures as they are, shape (unknowns,), [W]."""
+    slopes, duration = np.zeros(len(fit.z)), 0.0
+    for point in (fit.parts[i].point for i in fit.experiment.tested):
+        piece = point.trajectory.piece
         duration += float(piece.steps.sum())
-        loss += float(piece.steps @ point.balance.sources[:, experiment.machine.model.is_loss].sum(axis=-1))
-        for index, (unknown, z) in enumerate(zip(experiment.unknowns, fit.z.tolist(), strict=True)):
+        for index, (unknown, z) in enumerate(zip(fit.experiment.unknowns, fit.z.tolist(), strict=True)):
             heat = unknown.column(point, z).heat if in_scope(unknown, piece.recording) else None
             slopes[index] += 0.0 if heat is None else float(piece.steps @ heat.loss)
-    return loss / duration, slopes / duration
+    return slopes / duration

@@ -6,11 +6,12 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import chain
+from typing import TypeAlias
 
 import numpy as np
 
 from diagnosis.engine.fit import NO_SOLUTION, NOISE_ALONE, Experiment, Fit, Guess, calibrate
-from diagnosis.engine.mean_loss import mean_loss
+from diagnosis.engine.mean_loss import mean_loss, mean_loss_slopes
 from diagnosis.engine.scale import all_sizes_are_unknown, is_of_temperatures
 from diagnosis.engine.set_apart import without_channels
 from diagnosis.engine.unknown import Held, NetworkParameter, SensorBias, SensorLag, TermParameter, Unknown
@@ -24,7 +25,9 @@ QUIET = RandomHeat(heat=0.1, wander=0.1)  # times the random heat that is assume
 # heat; with free losses as well, by what thermometers are usually off.
 NEARER_K, LOSSES_K = 0.1, 0.3
 FAR_OFF = 2.0  # times the least error of the temperatures, beyond which a fit predicts too badly to be chosen
+MOST_LOSS = 1.5  # times the mean loss that was estimated, or as much less: more is no model of losses, however near
 LEAST_SHARE = 1e-6  # of the mean loss that an unknown changes per prior standard deviation
+Settled: TypeAlias = list[tuple[float, Fit]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,7 +67,7 @@ def calibrated_to_predict(plain: Fit, with_error: Fit, start: Array | None = Non
     if not estimated[-1]:
         tried = [replace(one, usual=(plain, *one.usual)) for one in tried]
     with suppress(ArithmeticError):
-        return _best_of(free, tried)
+        return _best_of(free, tried, with_error)
     return plain
 
 
@@ -112,7 +115,7 @@ def _calibrations(
 
 def _losses(fit: Fit) -> list[int]:
     """Places of the unknowns of the machine that its losses depend on, with temperatures as they are."""
-    loss, slopes = mean_loss(fit)
+    loss, slopes = mean_loss(fit), mean_loss_slopes(fit)
     return [
         index for index, unknown in enumerate(fit.experiment.unknowns)
         if isinstance(unknown, NetworkParameter | TermParameter) and abs(slopes[index]) > LEAST_SHARE * loss
@@ -129,15 +132,17 @@ def _instruments(experiment: Experiment) -> list[int]:
     ]  # fmt: skip
 
 
-def _best_of(free: Experiment, tried: Iterable[Calibrations]) -> Fit:
+def _best_of(free: Experiment, tried: Iterable[Calibrations], estimated: Fit) -> Fit:
     """The most probable of some calibrations that predict well, judged by the noise that is assumed.
 
-    Those count that come as near to the temperatures as the best ones of all, but for :data:`LOSSES_K`, the first such
-    ones; and of these those with less random heat only where they are nearer by :data:`NEARER_K`. Random heat lets a
-    course drift off, so that where the model lacks much, a fit which misses the temperatures by kelvins may be the most
-    probable one. With less random heat the courses stay near, but parameters stand in for what the model lacks.
+    Where no loss is measured in a machine of known size, those with another mean loss than was estimated with model
+    error (:data:`MOST_LOSS`) count only if there are no others. Of the rest those count that come as near to the
+    temperatures as the best ones of all, but for :data:`LOSSES_K`, the first such ones; and of these those with less
+    random heat only where they are nearer by :data:`NEARER_K`. Random heat lets a course drift off, so that where the
+    model lacks much, a fit which misses the temperatures by kelvins may be the most probable one. With less random heat
+    the courses stay near, but parameters stand in for what the model lacks.
     """
-    settled = [(_settled(one.usual), _settled(one.quiet)) for one in tried]
+    settled = _of_known_loss([(_settled(one.usual), _settled(one.quiet)) for one in tried], estimated)
     nearest = min((off_K for pair in settled for off_K, _ in chain(*pair)), default=np.inf)
     for usual, quiet in settled:
         near = min((off_K for off_K, _ in (*usual, *quiet)), default=np.inf)
@@ -151,7 +156,22 @@ def _best_of(free: Experiment, tried: Iterable[Calibrations]) -> Fit:
     raise ArithmeticError("the simulation has no solution without model error")
 
 
-def _settled(fits: Iterable[Fit]) -> list[tuple[float, Fit]]:
+def _of_known_loss(settled: Sequence[tuple[Settled, Settled]], estimated: Fit) -> Sequence[tuple[Settled, Settled]]:
+    """Those with about the mean loss that was estimated without a measured one in a machine of known size, else all."""
+    known = estimated.experiment
+    if not is_of_temperatures(known) or all_sizes_are_unknown(known.machine.model.network, known.unknowns):
+        return settled
+    loss = mean_loss(estimated)
+
+    def near(fits: Settled) -> Settled:
+        each = [(mean_loss(fit), off_K, fit) for off_K, fit in fits]
+        return [(off_K, fit) for own, off_K, fit in each if max(own, loss) <= MOST_LOSS * min(own, loss)]
+
+    found = [(near(usual), near(quiet)) for usual, quiet in settled]
+    return found if any(chain(*found)) else settled
+
+
+def _settled(fits: Iterable[Fit]) -> Settled:
     """Fits linearised once more, with their errors [K]: a course that has not settled may look better than it is."""
     found = []
     for one in fits:
@@ -196,7 +216,7 @@ def refit_to_predict(fit: Fit, plain: Fit, apart: Collection[str] = ()) -> Fit:
     found = _best_of(counting, _calibrations(
         counting, nominal if apart else fit.z,  # a broken sensor has bent what was estimated of the others
         [[*own, *held] for held in _estimated(fit)], [fit.z, nominal], [fit.z, nominal], fit.trajectories,
-    ))  # fmt: skip
+    ), fit)  # fmt: skip
     return every.fit(found.z, found.trajectories, iterations=0) if apart else found
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.engine.fit import Fit
-from diagnosis.engine.mean_loss import mean_loss
+from diagnosis.engine.mean_loss import mean_loss, mean_loss_slopes
 from diagnosis.engine.predict import Prediction
 from diagnosis.engine.scale import all_sizes_are_unknown, is_of_temperatures
 
@@ -67,7 +67,7 @@ def mean_loss_of(
     experiment, network = believed.experiment, believed.experiment.machine.model.network
     if not is_of_temperatures(experiment) or all_sizes_are_unknown(network, experiment.unknowns):
         return None
-    estimate, slopes = mean_loss(believed)
+    slopes = mean_loss_slopes(believed)
     is_loss = fit.experiment.machine.model.is_loss
 
     def mean_over(runs: Sequence[Prediction]) -> float:
@@ -79,6 +79,6 @@ def mean_loss_of(
         return float(np.average(loss, weights=np.concatenate([one.piece.steps for one in tested])))
 
     return MeanLoss(
-        estimate_W=estimate, stderr_W=float(np.sqrt(slopes @ believed.covariance @ slopes)),
+        estimate_W=mean_loss(believed), stderr_W=float(np.sqrt(slopes @ believed.covariance @ slopes)),
         predicting_W=mean_over(run), delivered_W=mean_over(delivered),
     )  # fmt: skip

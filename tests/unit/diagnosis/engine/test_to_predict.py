@@ -9,9 +9,9 @@ import pytest
 
 from diagnosis.engine import to_predict
 from diagnosis.engine.fit import Experiment, Fit, calibrate
-from diagnosis.engine.mean_loss import mean_loss
+from diagnosis.engine.mean_loss import mean_loss, mean_loss_slopes
 from diagnosis.engine.prepare import prepare_experiment
-from diagnosis.engine.to_predict import FAR_OFF, QUIET, calibrated_to_predict
+from diagnosis.engine.to_predict import FAR_OFF, MOST_LOSS, QUIET, calibrated_to_predict
 from diagnosis.forward.whitening import AS_ASSUMED
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
@@ -137,8 +137,8 @@ def test_losses_stay_as_estimated_where_temperatures_allow_it(
     estimated = estimated.experiment.fit(estimated.z, iterations=0)
     found = calibrated_to_predict(of_temperatures, estimated)
     np.testing.assert_array_equal(found.z[of_losses], estimated.z[of_losses])
-    loss, slopes = mean_loss(found)
-    assert loss == pytest.approx(1.1 * mean_loss(of_temperatures)[0], rel=0.02)
+    slopes = mean_loss_slopes(found)
+    assert mean_loss(found) == pytest.approx(1.1 * mean_loss(of_temperatures), rel=0.02)
     assert set(np.flatnonzero(slopes).tolist()) >= set(of_losses) and slopes[names.index("h_air")] == 0.0
     assert found.z[names.index("h_air")] > of_temperatures.z[names.index("h_air")] + 0.1  # the rest follows
 
@@ -146,6 +146,9 @@ def test_losses_stay_as_estimated_where_temperatures_allow_it(
     off_K = to_predict.LOSSES_K + 0.01
     monkeypatch.setattr(to_predict, "_off_by", lambda one: off_K if tuple(one.z[of_losses]) == held else 0.0)
     assert tuple(calibrated_to_predict(of_temperatures, estimated).z[of_losses]) != held
+    far = MOST_LOSS * 1.05 * mean_loss(estimated)
+    monkeypatch.setattr(to_predict, "mean_loss", lambda one: far if tuple(one.z[of_losses]) != held else far / 1.6)
+    assert tuple(calibrated_to_predict(of_temperatures, estimated).z[of_losses]) == held  # however near
 
 
 def test_less_random_heat_counts_only_where_temperatures_come_clearly_nearer(
