@@ -22,6 +22,7 @@ COLD_START_K = 5.0  # by which temperatures differ in a machine that has stood f
 USUAL_SHARE = 0.99  # of the rows of an input,
 FAR_TIMES = 10.0  # which others exceed so many times that they may be codes of a logger
 CODES, CODE_TIMES = (999.0, 9999.0, 99999.0, 32767.0, 32768.0, 65535.0), 1.5  # of loggers; beyond what is usual
+FAHRENHEIT_K = 15.0  # that a reading in another unit is off at least, from a few degC on
 COLDER_K = 3.0  # below the ambient air on average
 LEAST_LOSS, MOST_LOSS = 1e-3, 5.0  # of the power, on average; without load all of the power, and more, is lost
 BRIEF_S, WARMED_K = 300.0, 15.0  # no gearbox warms that fast
@@ -36,8 +37,8 @@ def doubts(found: RecordedRows, network: RecordedMachine) -> list[str]:
     found : RecordedRows
         In the units inside, impossible values and outliers taken out
     """
-    return [*_time_in_another_unit(found, network), *_hot(found, network), *_off_when_cold(found, network),
-            *_colder_than_ambient(found, network), *_loss_and_power(found), *_far_rows(found, network)]  # fmt: skip
+    looked_at = (_time_in_another_unit, _hot, _one_in_degF, _off_when_cold, _colder_than_ambient, _far_rows)
+    return [note for each in looked_at for note in each(found, network)] + [*_loss_and_power(found)]
 
 
 def _temperatures(found: RecordedRows, network: RecordedMachine) -> dict[str, Array]:
@@ -82,6 +83,24 @@ def _hot(found: RecordedRows, network: RecordedMachine) -> Iterator[str]:
             f"all temperatures begin at {min(firsts):.0f} to {max(firsts):.0f} degC, alike as in a machine that has "
             f"cooled down, but hot for one; {advice}"
         )
+
+
+def _one_in_degF(found: RecordedRows, network: RecordedMachine) -> Iterator[str]:
+    measured = _temperatures(found, network)
+    for quantity, values in measured.items():
+        others = [other for name, other in measured.items() if name != quantity]
+        if not others or found.roles[quantity].unit is not None:
+            continue
+        rows = np.isfinite(values) & np.isfinite(others).any(axis=0)
+        if not rows.any():
+            continue
+        middle = np.nanmedian(np.array(others)[:, rows], axis=0)
+        as_read, converted = (np.abs(T - middle) for T in (values[rows], (values[rows] - 32.0) / 1.8))
+        if as_read.min() > FAHRENHEIT_K and 4.0 * np.quantile(converted, 0.9) < np.median(as_read):
+            yield (
+                f"{found.names[quantity]} is {np.median(as_read):.0f} K above the other thermometers, and "
+                f'{np.median(converted):.1f} K off them if it is in degF: name its unit in a mapping (unit = "degF")'
+            )
 
 
 def _off_when_cold(found: RecordedRows, network: RecordedMachine) -> Iterator[str]:

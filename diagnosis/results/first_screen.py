@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from statistics import median
 from typing import TYPE_CHECKING
 
 from diagnosis.decision.posterior import Repeating, ScaledError
@@ -42,6 +43,7 @@ LIKELY_TEXT: Mapping[str, str] = {  # of the same verdicts where no name is a cl
     "sensor_fault": "A sensor, clock or recorded input is probably at fault, not the machine.",
 }
 EITHER = "The measurement is at fault, or the model leaves out physics: these data do not separate the two."
+ODD = 1.8  # times the error of the others, from which a recording that was learnt from is another one
 MISSED = "What was learnt from agrees with the model; held-out {names} not."
 UNFIT = "The model cannot be brought to fit these recordings, and why has no name."
 SIZES = {0.5: "half as large", 1.0: "as assumed", 2.0: "twice as large"}  # of model error, by factor
@@ -275,6 +277,7 @@ def _how_much_better(d: Diagnosis) -> tuple[str, ...]:
                 f"RMSE {name}{without}: {fits.before:.2f} K as delivered, {fits.calibrated:.2f} K calibrated"
                 f"{found}{learnt} (noise {d.noise_K:.2f} K)"
             )
+    lines += _odd_recordings(d)
     if (loss := d.model.mean_loss) is not None:
         apart = (
             ": more than its error, so take no losses from that model; temperatures alone give ratios of heats, and a "
@@ -313,7 +316,8 @@ def _how_much_better(d: Diagnosis) -> tuple[str, ...]:
             f"The correction also holds {further} effect{'s' * (further > 1)} without a certain name (grade learnt)"
         )
     scored = d.has_correction and math.isfinite(d.holdout_gain) and d.holdout_gain != 0.0  # 0: nothing was fitted
-    if scored and not (not_closer and more_probable):
+    withdrawn = d.contradicted and d.holdout.found > d.holdout.calibrated
+    if scored and not ((not_closer or withdrawn) and more_probable):
         way = "better than" if more_probable else "worse than"
         lines.append(f"Held-out readings are predicted {way} by the calibrated model, by {nat} of log score")
     if d.contradicted:
@@ -323,8 +327,22 @@ def _how_much_better(d: Diagnosis) -> tuple[str, ...]:
             without = ", and the corrected model does without them" if of_terms and not d.terms else ""
             lines.append(f"So the held-out recordings contradict the findings ({by}): no name is a claim{without}")
         else:
-            lines.append("So the held-out recordings do not confirm the findings: no name is a claim")
+            by = " (temperatures are no closer with them)" if withdrawn else ""
+            lines.append(f"So the held-out recordings do not confirm the findings{by}: no name is a claim")
     return tuple(lines)
+
+
+def _odd_recordings(d: Diagnosis) -> list[str]:
+    """A recording that was learnt from and is missed by far more than the others: something is wrong in it alone."""
+    off_K = {name: errors.after for name, errors in d.train.recordings.items()}
+    if len(off_K) < 2:
+        return []
+    worst = max(off_K, key=lambda name: off_K[name])
+    others = median(value for name, value in off_K.items() if name != worst)
+    if off_K[worst] < ODD * others or off_K[worst] - others < d.settings.matters_K:
+        return []
+    told = f"{worst} alone is missed by {off_K[worst]:.2f} K, the others that were learnt from by {others:.2f} K"
+    return [f"{told}: look in it for units, columns, instruments, and what was changed before"]
 
 
 def _worse_recordings(d: Diagnosis) -> list[str]:

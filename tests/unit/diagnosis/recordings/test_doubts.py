@@ -43,6 +43,8 @@ DOUBTS: dict[str, tuple[pd.DataFrame, str]] = {
     "degF": (in_degF(table()), "T_ambient_degC: 72 degC on average is hot for ambient air"),
     "degF, no ambient": (in_degF(table()).drop(columns="T_ambient_degC"),
                          'all temperatures begin at 72 to 73 degC, alike as in a machine that has cooled'),
+    "oil alone in degF": (with_thermometer(22.0).assign(T_oil_degC=in_degF(table())["T_oil_degC"]),
+                          "T_oil_degC is 73 K above the other thermometers, and 0.0 K off them if it is in degF"),
     "oil and ambient swapped": (table().rename(columns=SWAPPED),
                                 "T_oil_degC is 26 K below T_ambient_degC on average, although a gearbox gives heat"),
     "torque in kN m": (table().assign(torque_Nm=0.094),

@@ -347,3 +347,27 @@ def test_why_little_could_be_seen_is_told() -> None:
     why = "because the model fits this machine badly: calibrated, it is 4.61 K off what was held out"
     assert why in told(far, "Is something missing?")
     assert why not in told(replace(far, settings=Settings(matters_K=5.0)), "Is something missing?")
+
+
+def test_a_recording_that_is_another_one_is_named() -> None:
+    base = missing_physics()
+    alike = {"run_1": Errors(3.0, 0.9, 0.8), "run_2": Errors(3.0, 0.9, 1.0), "run_3": Errors(3.0, 2.6, 1.6)}
+    for matters_K, off_K, is_told in ((0.6, 1.6, False), (0.6, 1.7, True), (0.9, 1.7, False)):
+        recordings = alike | {"run_3": Errors(3.0, 2.6, off_K)}
+        settings = replace(base.settings, matters_K=matters_K)
+        lines = told(replace(base, settings=settings, train=replace(base.train, recordings=recordings)),
+                     "How much better?")  # fmt: skip
+        assert (
+            f"run_3 alone is missed by {off_K:.2f} K, the others that were learnt from by 0.90 K" in lines
+        ) is is_told
+    alone = replace(base, train=replace(base.train, recordings={"run_3": Errors(3.0, 2.6, 1.7)}))
+    assert "alone is missed" not in told(alone, "How much better?")
+
+
+def test_findings_with_which_temperatures_are_no_closer_are_not_called_better() -> None:
+    base = missing_physics()
+    farther = replace(base, holdout_gain=92.0, contradicted=True, holdout=replace(base.holdout, found=9.0))
+    lines = told(farther, "How much better?")
+    assert "do not confirm the findings (temperatures are no closer with them): no name is a claim" in lines
+    assert "predicted better" not in lines
+    assert "predicted better" in told(replace(base, holdout_gain=92.0), "How much better?")
