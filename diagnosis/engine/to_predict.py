@@ -6,7 +6,6 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import chain
-from typing import TypeAlias
 
 import numpy as np
 
@@ -25,9 +24,8 @@ QUIET = RandomHeat(heat=0.1, wander=0.1)  # times the random heat that is assume
 # heat; with free losses as well, by what thermometers are usually off.
 NEARER_K, LOSSES_K = 0.1, 0.3
 FAR_OFF = 2.0  # times the least error of the temperatures, beyond which a fit predicts too badly to be chosen
-MOST_LOSS = 1.5  # times the mean loss that was estimated, or as much less: more is no model of losses, however near
+MOST_LOSS = 1.5  # times the mean loss that was estimated, or as much less, beyond which a model is worse for it
 LEAST_SHARE = 1e-6  # of the mean loss that an unknown changes per prior standard deviation
-Settled: TypeAlias = list[tuple[float, Fit]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,7 +85,7 @@ def _estimated(with_error: Fit) -> list[list[int]]:
     known = with_error.experiment
     if all_sizes_are_unknown(known.machine.model.network, known.unknowns):
         return [[]]
-    instruments = _instruments(known)
+    instruments = instruments_of(known)
     return [*([[*instruments, *_losses(with_error)]] if is_of_temperatures(known) else []), instruments]
 
 
@@ -122,27 +120,35 @@ def _losses(fit: Fit) -> list[int]:
     ]  # fmt: skip
 
 
-def _instruments(experiment: Experiment) -> list[int]:
-    """Places of the unknowns of sensors and of recorded inputs, which the machine itself has none of."""
-    of_machine = {term.label for term in experiment.machine.terms if not term.of_measurement}
+def instruments_of(experiment: Experiment, findings: Collection[str] = ()) -> list[int]:
+    """Places of the unknowns of sensors and of recorded inputs, which the machine itself has none of.
+
+    Parameters
+    ----------
+    findings : collection of str
+        Labels of terms that do not count: faults that were found
+    """
+    others = {term.label for term in experiment.machine.terms if not term.of_measurement} | set(findings)
     return [
         index for index, unknown in enumerate(experiment.unknowns)
         if not isinstance(unknown, NetworkParameter | Held)
-        and not (isinstance(unknown, TermParameter) and unknown.label in of_machine)
+        and not (isinstance(unknown, TermParameter) and unknown.label in others)
     ]  # fmt: skip
 
 
 def _best_of(free: Experiment, tried: Iterable[Calibrations], estimated: Fit) -> Fit:
     """The most probable of some calibrations that predict well, judged by the noise that is assumed.
 
-    Where no loss is measured in a machine of known size, those with another mean loss than was estimated with model
-    error (:data:`MOST_LOSS`) count only if there are no others. Of the rest those count that come as near to the
-    temperatures as the best ones of all, but for :data:`LOSSES_K`, the first such ones; and of these those with less
-    random heat only where they are nearer by :data:`NEARER_K`. Random heat lets a course drift off, so that where the
-    model lacks much, a fit which misses the temperatures by kelvins may be the most probable one. With less random heat
-    the courses stay near, but parameters stand in for what the model lacks.
+    Those count that come as near to the temperatures as the best ones of all, but for :data:`LOSSES_K`, the first such
+    ones; and of these those with less random heat only where they are nearer by :data:`NEARER_K`. Random heat lets a
+    course drift off, so that where the model lacks much, a fit which misses the temperatures by kelvins may be the most
+    probable one. With less random heat the courses stay near, but parameters stand in for what the model lacks. Where
+    no loss is measured in a machine of known size, a loss that is twice too far off is as bad as temperatures that are.
     """
-    settled = _of_known_loss([(_settled(one.usual), _settled(one.quiet)) for one in tried], estimated)
+    known = estimated.experiment
+    unsized = all_sizes_are_unknown(known.machine.model.network, known.unknowns)
+    loss = mean_loss(estimated) if is_of_temperatures(known) and not unsized else None
+    settled = [(_settled(one.usual, loss), _settled(one.quiet, loss)) for one in tried]
     nearest = min((off_K for pair in settled for off_K, _ in chain(*pair)), default=np.inf)
     for usual, quiet in settled:
         near = min((off_K for off_K, _ in (*usual, *quiet)), default=np.inf)
@@ -156,28 +162,21 @@ def _best_of(free: Experiment, tried: Iterable[Calibrations], estimated: Fit) ->
     raise ArithmeticError("the simulation has no solution without model error")
 
 
-def _of_known_loss(settled: Sequence[tuple[Settled, Settled]], estimated: Fit) -> Sequence[tuple[Settled, Settled]]:
-    """Those with about the mean loss that was estimated without a measured one in a machine of known size, else all."""
-    known = estimated.experiment
-    if not is_of_temperatures(known) or all_sizes_are_unknown(known.machine.model.network, known.unknowns):
-        return settled
-    loss = mean_loss(estimated)
+def _settled(fits: Iterable[Fit], loss: float | None) -> list[tuple[float, Fit]]:
+    """Fits linearised once more, with their errors [K]: a course that has not settled may look better than it is.
 
-    def near(fits: Settled) -> Settled:
-        each = [(mean_loss(fit), off_K, fit) for off_K, fit in fits]
-        return [(off_K, fit) for own, off_K, fit in each if max(own, loss) <= MOST_LOSS * min(own, loss)]
-
-    found = [(near(usual), near(quiet)) for usual, quiet in settled]
-    return found if any(chain(*found)) else settled
-
-
-def _settled(fits: Iterable[Fit]) -> Settled:
-    """Fits linearised once more, with their errors [K]: a course that has not settled may look better than it is."""
+    Where the mean loss [W] is known an error counts as many times as the fit's own is farther off than
+    :data:`MOST_LOSS`.
+    """
     found = []
     for one in fits:
         with suppress(*NO_SOLUTION):
             again = replace(one.experiment, filters=None).fit(one.z, iterations=0)
-            found.append((_off_by(again), again))
+            off_K = _off_by(again)
+            if loss:
+                own = mean_loss(again)
+                off_K *= max(own / loss, loss / own, MOST_LOSS) / MOST_LOSS
+            found.append((off_K, again))
     return found
 
 

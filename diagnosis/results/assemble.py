@@ -155,6 +155,7 @@ def assemble(
         shapes=setup.shapes,
         learnt=predicting.learnt,
         left_out_K=predicting.left_out_K,
+        as_stated_K=predicting.as_stated_K,
         inputs=_provenance(setup),
         notes=(
             *ratio_notes(final), *limit_notes(final), *baseline_notes(experiment, posterior, valid.answers),

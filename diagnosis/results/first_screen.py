@@ -277,7 +277,7 @@ def _how_much_better(d: Diagnosis) -> tuple[str, ...]:
                 f"RMSE {name}{without}: {fits.before:.2f} K as delivered, {fits.calibrated:.2f} K calibrated"
                 f"{found}{learnt} (noise {d.noise_K:.2f} K)"
             )
-    lines += _odd_recordings(d)
+    lines += [*_as_stated(d), *_odd_recordings(d)]
     if (loss := d.model.mean_loss) is not None:
         apart = (
             ": more than its error, so take no losses from that model; temperatures alone give ratios of heats, and a "
@@ -330,6 +330,13 @@ def _how_much_better(d: Diagnosis) -> tuple[str, ...]:
             by = " (temperatures are no closer with them)" if withdrawn else ""
             lines.append(f"So the held-out recordings do not confirm the findings{by}: no name is a claim")
     return tuple(lines)
+
+
+def _as_stated(d: Diagnosis) -> list[str]:
+    if not d.as_stated_K - d.holdout.after > d.noise_K:
+        return []
+    told = f"With instruments as stated held-out temperatures are missed by {d.as_stated_K:.2f} K"
+    return [f"{told}: offsets, gains and lags that were estimated belong to the recorder, and an FMU has none"]
 
 
 def _odd_recordings(d: Diagnosis) -> list[str]:

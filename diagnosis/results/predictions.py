@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.learnt_error import is_writable, with_learnt_error
 from diagnosis.engine.predict import Prediction, log_score_gain, overall_rmse, predict, rmse, with_pieces_of
 from diagnosis.engine.set_apart import without_channels
+from diagnosis.engine.to_predict import instruments_of
 from diagnosis.results.result_parts import MODELS, Errors, Fits
 from models.base.types import Array
 from models.quantities.quantities import is_total_loss
@@ -39,6 +41,8 @@ class PredictingModel:
         corrected, with what was learnt of model error too where that helps
     train, holdout : Fits
         Their errors
+    as_stated_K : float
+        Error of the held-out temperatures with instruments as stated instead of as estimated; NaN without any
     holdout_gain : float
         Log score of it on the held-out readings, less that of the calibrated machine, [nat]
     """
@@ -51,6 +55,7 @@ class PredictingModel:
     holdout_runs: Predictions
     train: Fits
     holdout: Fits
+    as_stated_K: float
     holdout_gain: float
 
 
@@ -82,6 +87,7 @@ def predict_recordings(
     ArithmeticError
         If temperatures leave all bounds with the parameters as delivered, calibrated or found.
     """
+    columns, as_stated_K = _temperatures(experiment.pieces[0].channels, counting), float("nan")
     train = _states(experiment, plain, found, near=[trajectory.T for trajectory in found.trajectories])
     holdout = _states(judged, plain, found)
     final, learnt, left_out_K = found, tuple[Term, ...](), float("nan")
@@ -94,7 +100,6 @@ def predict_recordings(
                     _predictions(written, one, _courses(known))
                     for one, known in zip((experiment, judged), after, strict=True)
                 ]  # fmt: skip
-                columns = _temperatures(experiment.pieces[0].channels, counting)
                 # Far from a straight line it may do harm: parameters at limits and large factors go together.
                 farther = [overall_rmse(with_it, columns) - overall_rmse(without, columns)
                            for with_it, without in zip(there, after, strict=True)]  # fmt: skip
@@ -108,11 +113,23 @@ def predict_recordings(
     channels = experiment.pieces[0].channels
     faulty = set(channels) - set(counting)
     runs = holdout["after"], holdout["calibrated"]
+    with suppress(ArithmeticError):
+        stated = _predictions(_with_stated_instruments(final, best), judged, _courses(after[1]))
+        as_stated_K = overall_rmse(stated, columns)
     gain = log_score_gain(final, plain, without_channels(judged, faulty), runs)
     return PredictingModel(
         best=best, final=final, learnt=learnt, left_out_K=left_out_K, train_runs=train, holdout_runs=holdout,
-        train=_fits(channels, train, counting), holdout=_fits(channels, holdout, counting), holdout_gain=gain,
+        train=_fits(channels, train, counting), holdout=_fits(channels, holdout, counting),
+        as_stated_K=as_stated_K, holdout_gain=gain,
     )  # fmt: skip
+
+
+def _with_stated_instruments(fit: Fit, best: Judged | None) -> Fit:
+    """A fit without what was estimated of instruments and recorded inputs, but for the faults that were found."""
+    findings = [effect.term.label for effect in (best.effects if best else ()) if effect.term is not None]
+    z = fit.z.copy()
+    z[instruments_of(fit.experiment, findings)] = 0.0
+    return replace(fit, z=z)
 
 
 def _temperatures(channels: Sequence[str], counting: Collection[str]) -> list[int]:

@@ -96,6 +96,9 @@ class Diagnosis:
         What was learnt of model error and is in the prediction, see :mod:`diagnosis.engine.learnt_error`
     left_out_K : float
         Error of the held-out temperatures with what was learnt, where it is left out for that; else NaN
+    as_stated_K : float
+        Error of the held-out temperatures with instruments as stated instead of as estimated, but for the faults that
+        were found; NaN without any
     inputs : mapping
         Hashes and version
     notes : tuple of str
@@ -154,6 +157,7 @@ class Diagnosis:
     not_tried: tuple[str, ...] = ()
     learnt: tuple[Term, ...] = ()
     left_out_K: float = math.nan
+    as_stated_K: float = math.nan
     notes: tuple[str, ...] = ()
     kinds: Mapping[str, float] = field(default_factory=dict)
     settings: Settings = field(default_factory=Settings)
@@ -204,6 +208,7 @@ class Diagnosis:
             "mean_loss": None if self.model.mean_loss is None else asdict(self.model.mean_loss),
             "fit": {"train": self.train.to_dict(),
                     "holdout": self.holdout.to_dict() | {"log_score_gain": or_none(self.holdout_gain),
+                                                           "rmse_instruments_as_stated_K": or_none(self.as_stated_K),
                                                            "contradicts_findings": self.contradicted,
                                                            "missed": list(self.missed)},
                     "faulty_channels": list(self.faulty), "noise_K": self.noise_K, "floor": self.floor},

@@ -146,9 +146,12 @@ def test_losses_stay_as_estimated_where_temperatures_allow_it(
     off_K = to_predict.LOSSES_K + 0.01
     monkeypatch.setattr(to_predict, "_off_by", lambda one: off_K if tuple(one.z[of_losses]) == held else 0.0)
     assert tuple(calibrated_to_predict(of_temperatures, estimated).z[of_losses]) != held
-    far = MOST_LOSS * 1.05 * mean_loss(estimated)
-    monkeypatch.setattr(to_predict, "mean_loss", lambda one: far if tuple(one.z[of_losses]) != held else far / 1.6)
-    assert tuple(calibrated_to_predict(of_temperatures, estimated).z[of_losses]) == held  # however near
+    for times, off_K, stays in ((1.2, 1.1, True), (1.2, 1.3, False), (1.0, 1.1, False)):
+        losses = {True: 100.0, False: 2.0 * times * MOST_LOSS * 100.0}  # twice too far, and somewhat more
+        monkeypatch.setattr(to_predict, "mean_loss", lambda one, of=losses: of[tuple(one.z[of_losses]) == held])
+        errors = {True: 2.0 * off_K + to_predict.LOSSES_K, False: 1.0}
+        monkeypatch.setattr(to_predict, "_off_by", lambda one, of=errors: of[tuple(one.z[of_losses]) == held])
+        assert (tuple(calibrated_to_predict(of_temperatures, estimated).z[of_losses]) == held) is stays
 
 
 def test_less_random_heat_counts_only_where_temperatures_come_clearly_nearer(

@@ -110,3 +110,20 @@ def test_a_second_effect_is_left_out_where_held_out_readings_contradict_it(
     assert found.findings[0].grade == ("claim" if stays and left == 1.0 else "likely")
     assert (found.holdout.after < found.holdout.calibrated) is stays
     assert ("a second effect was fitted too and is left out" in str(found)) is stays
+
+
+def test_without_the_estimated_bias_of_a_thermometer_it_is_missed(assembled: Assemble, prepared: Prepared) -> None:
+    experiment, z = prepared[2].experiment, prepared[2].z.copy()
+    names = [unknown.parameter.name for unknown in experiment.unknowns]
+    offset = names.index("bias_oil")
+    z[predictions.instruments_of(experiment)] = 0.0
+    z[offset] = experiment.unknowns[offset].z_of(2.0)
+    fit = Fit(experiment=experiment, z=z, linearised=prepared[2].linearised)
+    stated = predictions._with_stated_instruments(fit, None)
+    assert stated.z[offset] == 0.0 and stated.z[names.index("mesh")] == z[names.index("mesh")]
+    found = assembled(posterior_of(prepared[2], log_e=-1.0), [])
+    assert found.as_stated_K > found.holdout.after  # windage is put down to instruments too
+    biased = predictions._predictions(fit, experiment, [None] * len(experiment.pieces))
+    plain = predictions._predictions(stated, experiment, [None] * len(experiment.pieces))
+    oil = experiment.pieces[0].channels.index("oil")
+    assert np.nanmean(biased[0].read[:, oil] - plain[0].read[:, oil]) == pytest.approx(2.0, abs=0.1)

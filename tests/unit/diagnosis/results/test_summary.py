@@ -371,3 +371,11 @@ def test_findings_with_which_temperatures_are_no_closer_are_not_called_better() 
     assert "do not confirm the findings (temperatures are no closer with them): no name is a claim" in lines
     assert "predicted better" not in lines
     assert "predicted better" in told(replace(base, holdout_gain=92.0), "How much better?")
+
+
+def test_what_an_fmu_misses_without_the_recorder_is_shown_where_it_is_more_than_noise() -> None:
+    base = missing_physics()
+    for more, is_told in ((0.9, False), (1.1, True)):
+        off_K = base.holdout.after + more * base.noise_K
+        lines = told(replace(base, as_stated_K=off_K), "How much better?")
+        assert (f"With instruments as stated held-out temperatures are missed by {off_K:.2f} K" in lines) is is_told
