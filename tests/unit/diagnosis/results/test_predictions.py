@@ -126,4 +126,4 @@ def test_without_the_estimated_bias_of_a_thermometer_it_is_missed(assembled: Ass
     biased = predictions._predictions(fit, experiment, [None] * len(experiment.pieces))
     plain = predictions._predictions(stated, experiment, [None] * len(experiment.pieces))
     oil = experiment.pieces[0].channels.index("oil")
-    assert np.nanmean(biased[0].read[:, oil] - plain[0].read[:, oil]) == pytest.approx(2.0, abs=0.1)
+    assert biased[0].read[-1, oil] - plain[0].read[-1, oil] == pytest.approx(2.0, abs=0.05)  # the start is another one
