@@ -93,7 +93,7 @@ def _missing(d: Diagnosis) -> str:
         )  # fmt: skip
         return (
             f"Not decided: {hidden} effects could hide that change a temperature by {d.settings.matters_K:g} K "
-            f"(--matters-K), because {why}."
+            f"(--matters-K), because {why}. Evidence {d.log_e_value:.1f} nat, {d.threshold:.1f} needed."
         )
     why = f"false-alarm rate of {100.0 * d.settings.false_alarm_rate:g} % asked for"
     if d.assumed.placebo is not None and d.threshold == d.assumed.placebo.log_e_value:

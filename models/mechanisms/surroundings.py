@@ -40,7 +40,7 @@ solar_soak = Mechanism(
         length(scale, 0.1, 0.25),
     ),
     law=lambda s: s.strength * sp.exp(-(((s.time - s.noon) / s.length) ** 2)),
-    says="Sun or a hot exhaust shines on the housing for some hours ({place}).",
+    says="Sun or a hot exhaust shines on the housing for a while ({place}).",
     reference="34 to 60 W on the FZG rig's upper housing; the bell shape is ours",
     experiment="shade the housing and repeat at the same hour",
 )

@@ -102,6 +102,8 @@ def _read(node: ast.expr) -> Any:
             return sp.pi if name == "pi" else symbol(name)
         case ast.BinOp(left=left, op=op, right=right) if type(op) in OPERATORS:
             return OPERATORS[type(op)](_read(left), _read(right))
+        case ast.BinOp(op=ast.BitXor()):
+            raise _not_allowed(node, "; a power is written **")
         case ast.UnaryOp(op=op, operand=operand):
             return OPERATORS[type(op)](_read(operand))
         case ast.BoolOp(op=op, values=values):

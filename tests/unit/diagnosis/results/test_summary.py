@@ -43,7 +43,10 @@ def test_the_verdict_stands_first_then_the_questions_in_order() -> None:
 def test_where_little_could_be_seen_the_summary_states_how_much_could_hide_and_the_option() -> None:
     line = "Not decided: 30 effects could hide that change a temperature by 4 K (--matters-K)"
     asked = replace(insufficient_data(), settings=Settings(matters_K=4.0))
-    assert told(asked, "Is something missing?").startswith(line)
+    answer = told(asked, "Is something missing?")
+    assert answer.startswith(line) and answer.endswith(
+        f"Evidence {asked.log_e_value:.1f} nat, {asked.threshold:.1f} needed."
+    )
 
 
 def test_what_each_size_of_model_error_needs_stands_with_the_evidence() -> None:

@@ -317,6 +317,7 @@ def test_text_of_a_law_gives_the_same_law(law: sp.Expr) -> None:
         ("().__class__.__bases__", "not allowed here"),
         ("[speed for speed in (1,)]", "not allowed here"),
         ("lambda: speed", "not allowed here"),
+        ("speed^2", r"not allowed here: 'speed \^ 2'; a power is written \*\*"),
         ("'text'", "not allowed here: \"'text'\""),
         ("1j", "not allowed here"),
         ("speed // 2", "not allowed here: 'speed // 2'"),
