@@ -272,6 +272,8 @@ def build(
             told = partial(progress, step)
             full = network.simulate(cycle, losses=losses, initial=COLD_START, progress=told).columns()
         notes += _at_rest(network, full)
+        if correction is not None and correction.mean_loss is not None and correction.mean_loss.warning:
+            notes.append(f"the corrected model predicts temperatures; {correction.mean_loss.warning}")
         cycles = {}
         for kind, path in fmus.items():
             if not runs_here(path):

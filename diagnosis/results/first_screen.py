@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 from diagnosis.decision.posterior import Repeating, ScaledError
 from diagnosis.engine.learnt import widest_class
-from diagnosis.results.mean_loss import FAR_SD
 from diagnosis.results.number_format import MINUS, number, share, with_error
 from diagnosis.results.result_parts import (
     LEAST_RIVAL,
@@ -21,6 +20,7 @@ from diagnosis.results.result_parts import (
     named,
     title_of,
 )
+from models.correction.correction import FAR_SD
 from models.mechanisms import OPEN_FORM
 from models.mechanisms.measurement import FAMILY as MEASUREMENT
 from models.quantities.units import behind_a_number

@@ -11,8 +11,7 @@ from diagnosis.engine.fit import Fit
 from diagnosis.engine.mean_loss import mean_loss, mean_loss_slopes
 from diagnosis.engine.predict import Prediction
 from diagnosis.engine.scale import all_sizes_are_unknown, is_of_temperatures
-
-FAR_SD = 2.0  # standard errors from an estimate, beyond which another number is not the same
+from models.correction.correction import FAR_SD
 
 
 @dataclass(frozen=True, kw_only=True)

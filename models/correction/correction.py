@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 HEADER = "# A correction: the same gearbox definition plus this file is the corrected model.\n"
+FAR_SD = 2.0  # standard errors from an estimate, beyond which another number is not the same
 BOUND_TOLERANCE = 1e-9  # a fit that ends at a bound may exceed it by rounding
 Grade = Literal["claim", "likely", "learnt"]
 SHAPE, MODEL_ERROR = "shape", "model error"  # mechanisms of findings that were learnt of them
@@ -56,6 +57,24 @@ class Estimate(Section):
     stderr: NotNegative
     unit: Text = "1"
     prior: float | None = None
+
+
+class MeanLoss(Section):
+    """``[mean_loss]``: of recordings that measure none, as estimated with its error and of this model, in W."""
+
+    estimate_W: NotNegative
+    stderr_W: NotNegative
+    model_W: NotNegative
+
+    @property
+    def warning(self) -> str:
+        """Half a sentence where the model is not to be asked for losses, else empty."""
+        if abs(self.model_W - self.estimate_W) <= FAR_SD * self.stderr_W:
+            return ""
+        return (
+            f"take no losses from it: {self.model_W:.3g} W on average, where {self.estimate_W:.3g} ± "
+            f"{self.stderr_W:.2g} W were estimated"
+        )
 
 
 class FoundParameter(LawParameter):
@@ -211,6 +230,7 @@ class Correction(Section):
     findings: tuple[Finding, ...] = Field(default=(), alias="finding")
     sensors: tuple[SensorCorrection, ...] = Field(default=(), alias="sensor")
     inputs: tuple[InputCorrection, ...] = Field(default=(), alias="input")
+    mean_loss: MeanLoss | None = None
 
     @model_validator(mode="after")
     def _instruments_are_named_once(self) -> Self:
@@ -244,6 +264,7 @@ class Correction(Section):
         inputs: Iterable[InputCorrection] = (),
         recordings: Mapping[str, str] | None = None,
         version: str = "",
+        mean_loss: MeanLoss | None = None,
     ) -> Correction:
         """Return the correction of a gearbox; `recordings` are hashes by name."""
         return cls(
@@ -254,6 +275,7 @@ class Correction(Section):
             sensor=tuple(sensors),
             input=tuple(inputs),
             version=version,
+            mean_loss=mean_loss,
         )
 
     def apply(self, network: ThermalNetwork, *, as_recorded: bool = False) -> ThermalNetwork:
@@ -337,7 +359,7 @@ class Correction(Section):
         diagnosis estimates them again from its own.
         """
         kept = (f for f in self.findings if not f.of_measurement and f.mechanism not in (SHAPE, MODEL_ERROR))
-        return self.model_copy(update={"findings": tuple(kept), "sensors": (), "inputs": ()})
+        return self.model_copy(update={"findings": tuple(kept), "sensors": (), "inputs": (), "mean_loss": None})
 
     def summary(self) -> dict[str, Any]:
         """Return the names of the findings that change the machine, and a hash of the whole, for a report."""
@@ -358,8 +380,9 @@ class Correction(Section):
     @property
     def words(self) -> str:
         """Half a sentence about it, for an FMU that contains it."""
-        summary = self.summary()
-        return f"corrected by {', '.join(summary['findings']) or 'calibration'} (correction {summary['sha256'][:12]})"
+        summary, warning = self.summary(), self.mean_loss.warning if self.mean_loss else ""
+        names = ", ".join(summary["findings"]) or "calibration"
+        return f"corrected by {names} (correction {summary['sha256'][:12]}{f'; {warning}' if warning else ''})"
 
 
 def _calibration_faults(calibration: Iterable[Estimate], network: ThermalNetwork) -> Iterator[str]:

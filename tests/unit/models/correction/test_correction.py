@@ -16,6 +16,7 @@ from models.correction.correction import (
     Correction,
     Estimate,
     Finding,
+    MeanLoss,
     correction_text,
     read_correction,
     write_correction,
@@ -456,3 +457,14 @@ def test_an_fmu_does_not_claim_what_is_wrong_with_the_recorder() -> None:
     faults = tuple(one.model_copy(update={"of_measurement": True}) for one in CORRECTION.findings)
     at_fault = CORRECTION.model_copy(update={"findings": faults})
     assert at_fault.words.startswith("corrected by calibration (")
+
+
+@pytest.mark.parametrize(("model_W", "is_warned"), [(785.0, True), (255.0, False), (257.0, True), (183.0, True)])
+def test_a_model_whose_losses_are_not_those_estimated_says_so(tmp_path: Path, model_W: float, is_warned: bool) -> None:
+    loss = MeanLoss(estimate_W=220.0, stderr_W=18.0, model_W=model_W)
+    write_correction(CORRECTION.model_copy(update={"mean_loss": loss}), tmp_path / "far.toml")
+    read = read_correction(tmp_path / "far.toml", RIG)
+    assert read.mean_loss == loss and read.of_machine().mean_loss is None
+    warning = f"; take no losses from it: {model_W:.0f} W on average, where 220 ± 18 W were estimated)"
+    assert read.words.endswith(warning) is is_warned
+    assert bool(loss.warning) is is_warned
