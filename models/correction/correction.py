@@ -72,8 +72,8 @@ class MeanLoss(Section):
         if abs(self.model_W - self.estimate_W) <= FAR_SD * self.stderr_W:
             return ""
         return (
-            f"take no losses from it: {self.model_W:.3g} W on average, where {self.estimate_W:.3g} ± "
-            f"{self.stderr_W:.2g} W were estimated"
+            f"take no losses from it: {self.model_W:.4g} W on average, where {self.estimate_W:.4g} ± "
+            f"{self.stderr_W:.3g} W were estimated"
         )
 
 
