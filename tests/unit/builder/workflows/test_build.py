@@ -22,7 +22,7 @@ from builder.workflows import build as builder_build
 from builder.workflows.build import build, cycle_errors
 from builder.workflows.known_physics import known_finding
 from models.assembly.gearbox import Gearbox, load_gearbox
-from models.correction.correction import Correction, Estimate
+from models.correction.correction import Correction, Estimate, MeanLoss
 
 
 def test_errors_over_a_cycle_are_those_of_the_fmu_against_the_model() -> None:
@@ -138,3 +138,17 @@ def test_a_control_that_rests_in_the_reference_cycle_is_not_compared(
     report = build(reducer, tmp_path, target="native", correction=Correction.of(reducer, findings=[cooler]))
     told = [note for note in report.notes if "not compared (state_cooler_thermostat_oil_valve)" in note]
     assert len(told) == rests
+
+
+@pytest.mark.skipif(native_compile._own_compiler() is None, reason="no C compiler")
+def test_a_model_that_is_not_to_be_asked_for_losses_says_so_wherever_it_goes(tmp_path: Path) -> None:
+    reducer = load_gearbox("reducer")
+    loss = MeanLoss(estimate_W=220.0, stderr_W=18.0, model_W=705.0)
+    known = Correction.of(reducer, calibration=[Estimate(name="C_oil", value=1.1, stderr=0.1)], mean_loss=loss)
+    report = build(reducer, tmp_path, target="native", correction=known)
+    warning = "take no losses from it: 705 W on average, where 220 ± 18 W were estimated"
+    assert [note for note in report.notes if warning in note] == [
+        f"the corrected model predicts temperatures; {warning}"
+    ]
+    (fmu,) = (path for path in report.files if path.suffix == ".fmu")
+    assert warning in read_model_description(fmu).description
