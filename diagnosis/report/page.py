@@ -38,7 +38,8 @@ def page(diagnosis: Diagnosis) -> str:
         with_error=numbers.with_error,
         drawn=equation.drawn,
     )
-    known = (*diagnosis.network.parameters, *(p for term in diagnosis.shapes for p in term.parameters))
+    terms = (*diagnosis.shapes, *(finding.term for finding in diagnosis.findings if finding.term is not None))
+    known = (*diagnosis.network.parameters, *(p for term in terms for p in term.parameters))
     farthest_first = sorted(diagnosis.calibration, key=lambda one: -abs(one.shift_in_sd))
     return environment.from_string(_text("report.html.j2")).render(
         d=diagnosis,

@@ -79,12 +79,12 @@ def two_effects() -> Diagnosis:
         replace(base.findings[0], mechanism="cooler_thermostat", family=cooler.family, kind="link", term=cooler,
                 says=cooler.says, reference=cooler.mechanism.reference,
                 equation=cooler.equation({cooler.strength.name: 11.3}), confusable_with=(),
-                parameters=(ParameterValue(name=cooler.strength.name, value=11.3, stderr=0.6, unit="W/K"),),
+                parameters=(ParameterValue(name="strength", value=11.3, stderr=0.6, unit="W/K"),),
                 heat_mean_W=80.0, heat_max_W=310.0),
         replace(base.findings[0], mechanism="bearing_seat_contact", place="bearing_1_housing", node="bearing_1",
                 family=seat.family, kind="link_factor", term=seat, says=seat.says, equation=seat.equation(),
                 probability=0.58,
-                parameters=(ParameterValue(name=seat.strength.name, value=-0.62, stderr=0.2, unit="1"),)),
+                parameters=(ParameterValue(name="strength", value=-0.62, stderr=0.2, unit="1"),)),
     )  # fmt: skip
     return replace(base, findings=findings)
 
@@ -96,7 +96,7 @@ def sensor_fault() -> Diagnosis:
         mechanism="sensor_drift", family=drift.family, place="bearing_1", node="bearing_1", kind="sensor",
         says=drift.says, reference=drift.mechanism.reference, equation=drift.equation(), probability=0.998,
         log_bayes=63.0, term=drift,
-        parameters=(ParameterValue(name=drift.strength.name, value=-3.12, stderr=0.15, unit="K"),),
+        parameters=(ParameterValue(name="strength", value=-3.12, stderr=0.15, unit="K"),),
     )  # fmt: skip
     return replace(
         missing_physics(), verdict="sensor_fault", findings=(finding,), location=(),
@@ -180,8 +180,8 @@ def _windage() -> Finding:
         probability=0.914,
         log_bayes=44.2,
         parameters=(
-            ParameterValue(name=strength, value=18.43, stderr=1.12, unit="W"),
-            ParameterValue(name=exponent, value=2.87, stderr=0.09, unit="1"),
+            ParameterValue(name="strength", value=18.43, stderr=1.12, unit="W"),
+            ParameterValue(name="exponent", value=2.87, stderr=0.09, unit="1"),
         ),
         confusable_with=(
             *(

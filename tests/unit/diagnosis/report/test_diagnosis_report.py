@@ -165,6 +165,10 @@ def test_pieces_of_one_recording_are_told_apart_and_counted_once() -> None:
     assert "from 2 recordings" in Text(page(diagnosis)).plain
 
 
+def test_numbers_of_a_finding_have_their_meaning(pages: dict[str, str]) -> None:
+    assert 'strength<br><span class="soft">heat at the reference speed</span>' in pages["missing_physics"]
+
+
 def test_a_parameter_out_of_its_prior_is_told_as_one() -> None:
     base = missing_physics()
     finding = replace(
