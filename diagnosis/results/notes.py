@@ -76,12 +76,12 @@ def evidence_in_baselines(fit: Fit, effect: Hypothesis) -> float:
 def limit_notes(fit: Fit) -> tuple[str, ...]:
     """One sentence if the model that predicts has unknowns at their limits, where they stand in for something else.
 
-    Shares may be 0 or 1.
+    Shares may be 0 or 1, and what is held is no unknown.
     """
     at = []
     for unknown, z in zip(fit.experiment.unknowns, fit.z.tolist(), strict=True):
         p, value = unknown.parameter, unknown.value(z)
-        if (p.lower, p.upper) != (0.0, 1.0) and min(value - p.lower, p.upper - value) <= AT_LIMIT * abs(value):
+        if p.sd and (p.lower, p.upper) != (0.0, 1.0) and min(value - p.lower, p.upper - value) <= AT_LIMIT * abs(value):
             at.append(f"{p.name} = {value:.4g}{behind_a_number(p.unit)}")
     if not at:
         return ()

@@ -82,16 +82,14 @@ def test_unknowns_at_their_limits_are_no_estimates(prepared: Prepared) -> None:
     z[high] = unknowns[high].z_of(unknowns[high].parameter.upper)
     (both,) = limit_notes(replace(plain, z=z))
     assert "are at their limits" in both and "h_air = " in both
-    whole = replace(unknowns[high].parameter, lower=0.0, upper=1.0, log=False, start=1.0)
-    assert (
-        limit_notes(
-            replace(
-                plain,
-                experiment=replace(
-                    plain.experiment,
-                    unknowns=tuple(replace(u, parameter=whole) if u is unknowns[high] else u for u in unknowns),
-                ),
-            )
-        )
-        == ()
-    )  # a share may be whole
+    # A share may be whole, and what is held is no unknown.
+    for other in (
+        {"lower": 0.0, "upper": 1.0, "log": False, "start": 1.0},
+        {"sd": 0.0, "start": unknowns[high].parameter.upper},
+    ):
+        p = replace(unknowns[high].parameter, **other)
+        one_other = tuple(replace(u, parameter=p) if u is unknowns[high] else u for u in unknowns)
+        at_limits = z.copy()
+        at_limits[low] = 0.0
+        there = replace(plain.experiment, unknowns=one_other)
+        assert limit_notes(replace(plain, experiment=there, z=at_limits)) == ()
