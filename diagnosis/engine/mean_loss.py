@@ -4,9 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.engine.fit import Fit
+from diagnosis.engine.fit import Experiment, Fit
+from diagnosis.engine.scale import all_sizes_are_unknown, is_of_temperatures
 from diagnosis.engine.unknown import in_scope
 from models.base.types import Array
+
+
+def is_estimated(experiment: Experiment) -> bool:
+    """True if the mean loss is an estimate: none is measured, and the definition fixes sizes."""
+    network = experiment.machine.model.network
+    return is_of_temperatures(experiment) and not all_sizes_are_unknown(network, experiment.unknowns)
 
 
 def mean_loss(fit: Fit) -> float:

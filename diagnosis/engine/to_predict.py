@@ -10,7 +10,7 @@ from itertools import chain
 import numpy as np
 
 from diagnosis.engine.fit import NO_SOLUTION, NOISE_ALONE, Experiment, Fit, Guess, calibrate
-from diagnosis.engine.mean_loss import mean_loss, mean_loss_slopes
+from diagnosis.engine.mean_loss import is_estimated, mean_loss, mean_loss_slopes
 from diagnosis.engine.scale import all_sizes_are_unknown, is_of_temperatures
 from diagnosis.engine.set_apart import without_channels
 from diagnosis.engine.unknown import Held, NetworkParameter, SensorBias, SensorLag, TermParameter, Unknown
@@ -143,11 +143,10 @@ def _best_of(free: Experiment, tried: Iterable[Calibrations], estimated: Fit) ->
     ones; and of these those with less random heat only where they are nearer by :data:`NEARER_K`. Random heat lets a
     course drift off, so that where the model lacks much, a fit which misses the temperatures by kelvins may be the most
     probable one. With less random heat the courses stay near, but parameters stand in for what the model lacks. Where
-    no loss is measured in a machine of known size, a loss that is twice too far off is as bad as temperatures that are.
+    the mean loss is estimated, a fit that is farther from it than :data:`MOST_LOSS` has its error multiplied by the
+    excess.
     """
-    known = estimated.experiment
-    unsized = all_sizes_are_unknown(known.machine.model.network, known.unknowns)
-    loss = mean_loss(estimated) if is_of_temperatures(known) and not unsized else None
+    loss = mean_loss(estimated) if is_estimated(estimated.experiment) else None
     settled = [(_settled(one.usual, loss), _settled(one.quiet, loss)) for one in tried]
     nearest = min((off_K for pair in settled for off_K, _ in chain(*pair)), default=np.inf)
     for usual, quiet in settled:
@@ -165,8 +164,7 @@ def _best_of(free: Experiment, tried: Iterable[Calibrations], estimated: Fit) ->
 def _settled(fits: Iterable[Fit], loss: float | None) -> list[tuple[float, Fit]]:
     """Fits linearised once more, with their errors [K]: a course that has not settled may look better than it is.
 
-    Where the mean loss [W] is known an error counts as many times as the fit's own is farther off than
-    :data:`MOST_LOSS`.
+    With an estimated mean loss [W], an error is multiplied by the excess of the fit's own over :data:`MOST_LOSS`.
     """
     found = []
     for one in fits:

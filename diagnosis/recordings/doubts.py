@@ -22,7 +22,7 @@ COLD_START_K = 5.0  # by which temperatures differ in a machine that has stood f
 USUAL_SHARE = 0.99  # of the rows of an input,
 FAR_TIMES = 10.0  # which others exceed so many times that they may be codes of a logger
 CODES, CODE_TIMES = (999.0, 9999.0, 99999.0, 32767.0, 32768.0, 65535.0), 1.5  # of loggers; beyond what is usual
-FAHRENHEIT_K = 15.0  # that a reading in another unit is off at least, from a few degC on
+FAHRENHEIT_K, NEARER = 15.0, 4.0  # above the others at least, if from -20 degC on; times nearer once it is converted
 COLDER_K = 3.0  # below the ambient air on average
 LEAST_LOSS, MOST_LOSS = 1e-3, 5.0  # of the power, on average; without load all of the power, and more, is lost
 BRIEF_S, WARMED_K = 300.0, 15.0  # no gearbox warms that fast
@@ -96,7 +96,7 @@ def _one_in_degF(found: RecordedRows, network: RecordedMachine) -> Iterator[str]
             continue
         middle = np.nanmedian(np.array(others)[:, rows], axis=0)
         as_read, converted = (np.abs(T - middle) for T in (values[rows], (values[rows] - 32.0) / 1.8))
-        if as_read.min() > FAHRENHEIT_K and 4.0 * np.quantile(converted, 0.9) < np.median(as_read):
+        if as_read.min() > FAHRENHEIT_K and NEARER * np.quantile(converted, 0.9) < np.median(as_read):
             yield (
                 f"{found.names[quantity]} is {np.median(as_read):.0f} K above the other thermometers, and "
                 f'{np.median(converted):.1f} K off them if it is in degF: name its unit in a mapping (unit = "degF")'

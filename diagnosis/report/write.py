@@ -16,7 +16,7 @@ from diagnosis.results.result import Diagnosis
 from models.assembly.gearbox import Gearbox
 from models.base.atomic_write import atomic_file
 from models.base.errors import InputError
-from models.correction.correction import MODEL_ERROR, SHAPE, Correction, Estimate, Finding, MeanLoss, write_correction
+from models.correction.correction import MODEL_ERROR, SHAPE, Correction, Estimate, Finding, write_correction
 from models.files.output_files import refuse_to_replace
 from models.terms.term import Term
 
@@ -89,7 +89,6 @@ def correction_of(diagnosis: Diagnosis, gearbox: Gearbox) -> Correction:
                    grade="learnt")
         for term in diagnosis.learnt
     ]  # fmt: skip
-    loss = diagnosis.model.mean_loss
     return Correction.of(
         gearbox,
         findings=findings,
@@ -102,10 +101,8 @@ def correction_of(diagnosis: Diagnosis, gearbox: Gearbox) -> Correction:
         inputs=diagnosis.model.true_inputs,
         recordings=dict(diagnosis.inputs["recordings"]),
         version=str(diagnosis.inputs["version"]),
-        mean_loss=None if loss is None else MeanLoss(
-            estimate_W=loss.estimate_W, stderr_W=loss.stderr_W, model_W=loss.predicting_W
-        ),
-    )  # fmt: skip
+        mean_loss=diagnosis.model.mean_loss,
+    )
 
 
 def _finding_of(term: Term, diagnosis: Diagnosis) -> Finding:

@@ -3,48 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from diagnosis.engine.fit import Fit
-from diagnosis.engine.mean_loss import mean_loss, mean_loss_slopes
+from diagnosis.engine.mean_loss import is_estimated, mean_loss, mean_loss_slopes
 from diagnosis.engine.predict import Prediction
-from diagnosis.engine.scale import all_sizes_are_unknown, is_of_temperatures
-from models.correction.correction import FAR_SD
-
-
-@dataclass(frozen=True, kw_only=True)
-class MeanLoss:
-    """Mean total loss over the tested recordings, which measure none: temperatures identify ratios of heats alone.
-
-    Attributes
-    ----------
-    estimate_W, stderr_W : float
-        With model error in place, so that the priors of heats, conductances and capacities have their say
-    predicting_W : float
-        Of the model that predicts: parameters may stand in for model error there
-    delivered_W : float
-        Of the machine as its definition has it
-    """
-
-    estimate_W: float
-    stderr_W: float
-    predicting_W: float
-    delivered_W: float
-
-    @property
-    def is_far(self) -> bool:
-        """True if the model that predicts is not to be asked for losses."""
-        return self._is_far(self.predicting_W)
-
-    @property
-    def moved(self) -> bool:
-        """True if the definition has another loss: one of both is wrong, or a heat capacity."""
-        return self._is_far(self.delivered_W)
-
-    def _is_far(self, other_W: float) -> bool:
-        return abs(other_W - self.estimate_W) > FAR_SD * self.stderr_W
+from models.correction.correction import MeanLoss
 
 
 def mean_loss_of(
@@ -63,8 +28,8 @@ def mean_loss_of(
     delivered : sequence of Prediction
         Of the same recordings, by the machine as delivered
     """
-    experiment, network = believed.experiment, believed.experiment.machine.model.network
-    if not is_of_temperatures(experiment) or all_sizes_are_unknown(network, experiment.unknowns):
+    experiment = believed.experiment
+    if not is_estimated(experiment):
         return None
     slopes = mean_loss_slopes(believed)
     is_loss = fit.experiment.machine.model.is_loss

@@ -205,7 +205,7 @@ class Diagnosis:
             ],
             "findings": [finding.to_dict() for finding in self.findings],
             "calibration": [asdict(one) for one in self.calibration],
-            "mean_loss": None if self.model.mean_loss is None else asdict(self.model.mean_loss),
+            "mean_loss": None if self.model.mean_loss is None else self.model.mean_loss.model_dump(),
             "fit": {"train": self.train.to_dict(),
                     "holdout": self.holdout.to_dict() | {"log_score_gain": or_none(self.holdout_gain),
                                                            "rmse_instruments_as_stated_K": or_none(self.as_stated_K),

@@ -8,8 +8,8 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, NamedTuple
 
 from diagnosis.decision.answer import Grade
-from diagnosis.results.mean_loss import MeanLoss
 from models.base.types import Array
+from models.correction.correction import MeanLoss
 from models.correction.instruments import InputCorrection, SensorCorrection
 from models.quantities.quantities import is_total_loss
 from models.terms.term import Term

@@ -60,19 +60,38 @@ class Estimate(Section):
 
 
 class MeanLoss(Section):
-    """``[mean_loss]``: of recordings that measure none, as estimated with its error and of this model, in W."""
+    """``[mean_loss]``: mean total loss of recordings that measure none, in W.
 
-    estimate_W: NotNegative
+    `estimate_W` and its standard error are with model error in place, so that the priors of heats, conductances and
+    capacities have their say. `predicting_W` is of the model that predicts, where parameters may stand in for model
+    error; `delivered_W` of the machine as its definition has it.
+    """
+
+    estimate_W: float
     stderr_W: NotNegative
-    model_W: NotNegative
+    predicting_W: float
+    delivered_W: float
+
+    @property
+    def is_far(self) -> bool:
+        """True if the model that predicts is not to be asked for losses."""
+        return self._is_far(self.predicting_W)
+
+    @property
+    def moved(self) -> bool:
+        """True if the definition has another loss: one of both is wrong, or a heat capacity."""
+        return self._is_far(self.delivered_W)
+
+    def _is_far(self, other_W: float) -> bool:
+        return abs(other_W - self.estimate_W) > FAR_SD * self.stderr_W
 
     @property
     def warning(self) -> str:
-        """Half a sentence where the model is not to be asked for losses, else empty."""
-        if abs(self.model_W - self.estimate_W) <= FAR_SD * self.stderr_W:
+        """Half a sentence for whoever uses that model, where it is far from the estimate; else empty."""
+        if not self.is_far:
             return ""
         return (
-            f"take no losses from it: {self.model_W:.4g} W on average, where {self.estimate_W:.4g} ± "
+            f"take no losses from it: {self.predicting_W:.4g} W on average, where {self.estimate_W:.4g} ± "
             f"{self.stderr_W:.3g} W were estimated"
         )
 

@@ -143,7 +143,7 @@ def test_a_control_that_rests_in_the_reference_cycle_is_not_compared(
 @pytest.mark.skipif(native_compile._own_compiler() is None, reason="no C compiler")
 def test_a_model_that_is_not_to_be_asked_for_losses_says_so_wherever_it_goes(tmp_path: Path) -> None:
     reducer = load_gearbox("reducer")
-    loss = MeanLoss(estimate_W=220.0, stderr_W=18.0, model_W=705.0)
+    loss = MeanLoss(estimate_W=220.0, stderr_W=18.0, predicting_W=705.0, delivered_W=216.0)
     known = Correction.of(reducer, calibration=[Estimate(name="C_oil", value=1.1, stderr=0.1)], mean_loss=loss)
     report = build(reducer, tmp_path, target="native", correction=known)
     warning = "take no losses from it: 705 W on average, where 220 ± 18 W were estimated"

@@ -13,10 +13,10 @@ from diagnosis.decision.settings import Settings
 from diagnosis.report import finding_charts
 from diagnosis.report.page import page
 from diagnosis.results.first_screen import EITHER, VERDICT_TEXT, predicting_told
-from diagnosis.results.mean_loss import MeanLoss
 from diagnosis.results.number_format import number
 from diagnosis.results.result import Diagnosis
 from diagnosis.results.result_parts import CalibratedModel, Change, Errors, Fits, Ranked, Rival, Switching
+from models.correction.correction import MeanLoss
 from tests.unit.diagnosis.diagnosis_example import (
     consistent,
     insufficient_data,
@@ -238,9 +238,9 @@ def test_a_loss_that_is_not_measured_is_given_with_its_error_and_with_what_predi
     assert usual.to_dict()["mean_loss"] == {
         "estimate_W": 449.0, "stderr_W": 29.0, "predicting_W": 462.0, "delivered_W": 480.0
     }  # fmt: skip
-    far = replace(usual, model=CalibratedModel(mean_loss=replace(loss, predicting_W=508.0)))
+    far = replace(usual, model=CalibratedModel(mean_loss=loss.model_copy(update={"predicting_W": 508.0})))
     assert "508 W in the model that predicts: more than its error" in told(far, "How much better?")
-    moved = replace(usual, model=CalibratedModel(mean_loss=replace(loss, delivered_W=600.0)))
+    moved = replace(usual, model=CalibratedModel(mean_loss=loss.model_copy(update={"delivered_W": 600.0})))
     assert "predicts. Without a measured loss watts rest on the heat capacities" in told(moved, "How much better?")
     assert "Mean total loss" not in str(missing_physics()) and missing_physics().to_dict()["mean_loss"] is None
 

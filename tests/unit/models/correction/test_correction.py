@@ -461,7 +461,7 @@ def test_an_fmu_does_not_claim_what_is_wrong_with_the_recorder() -> None:
 
 @pytest.mark.parametrize(("model_W", "is_warned"), [(1785.0, True), (255.0, False), (257.0, True), (183.0, True)])
 def test_a_model_whose_losses_are_not_those_estimated_says_so(tmp_path: Path, model_W: float, is_warned: bool) -> None:
-    loss = MeanLoss(estimate_W=220.0, stderr_W=18.0, model_W=model_W)
+    loss = MeanLoss(estimate_W=220.0, stderr_W=18.0, predicting_W=model_W, delivered_W=216.0)
     write_correction(CORRECTION.model_copy(update={"mean_loss": loss}), tmp_path / "far.toml")
     read = read_correction(tmp_path / "far.toml", RIG)
     assert read.mean_loss == loss and read.of_machine().mean_loss is None
