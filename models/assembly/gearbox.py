@@ -129,7 +129,7 @@ class Gearbox:
 
     @property
     def stage(self) -> tuple[Stage, ...]:
-        """``[[stage]]``; exactly one for now."""
+        """``[[stage]]``, from the input shaft on."""
         return self.geometry.stage
 
     @property
@@ -195,6 +195,16 @@ class Gearbox:
     def speed_ratio(self) -> Mapping[str, float]:
         """Speed of every shaft over the speed of the input shaft, by shaft name, [-]."""
         return self.geometry.speed_ratio
+
+    @property
+    def torque_ratio(self) -> Mapping[str, float]:
+        """Torque of every shaft without losses over the torque of the input shaft, by shaft name, [-]."""
+        return self.geometry.torque_ratio
+
+    @property
+    def level_below_axis(self) -> Mapping[str, float]:
+        """Oil level below the axis of every shaft, by shaft name, [m]."""
+        return self.geometry.level_below_axis
 
     def source_of(self, path: str) -> str:
         """Return where a value comes from.

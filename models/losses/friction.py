@@ -10,11 +10,21 @@ import numpy as np
 
 from models.base.root_finding import decreasing_root
 from models.base.types import Array, Numeric
+from models.definition.sections import Stage
 from models.formulas import ehl
 from models.formulas.load_sharing import contact_points
 from models.formulas.oil import Oil
 from models.losses.loss_term import MESH as MESH_NODE
-from models.losses.loss_term import SPEED, TORQUE, TORQUE_FLOOR_NM, GearboxData, LossKind, LossTerm, TermInput
+from models.losses.loss_term import (
+    SPEED,
+    TORQUE,
+    TORQUE_FLOOR_NM,
+    GearboxData,
+    LossKind,
+    LossTerm,
+    TermInput,
+    of_stages,
+)
 from models.portable.evaluation import RPM
 
 FILM_TEMPERATURE_TOL = 5e-3  # K, residual of the film temperature
@@ -150,13 +160,15 @@ class MeshContact:
     film: Film = "hamrock_dowson"
     thermal_reduction: ThermalReduction = "gupta"
     rolling_constant: float = 9.0e7
+    lowest_torque: float = TORQUE_FLOOR_NM
 
     def power(self, x: Array) -> Array:
         """Sliding and rolling loss [W], (N, 2), at speed [1/min], torque [N m], gear temperatures [degC], (N, 4).
 
-        The contact is evaluated at 1 N m at least.
+        The contact is evaluated at `lowest_torque` at least: that of its pinion at 1 N m of the input shaft.
         """
-        losses = self.loss(omega_1=x[:, 0] * RPM, torque=np.maximum(x[:, 1], TORQUE_FLOOR_NM), T_1=x[:, 2], T_2=x[:, 3])
+        torque = np.maximum(x[:, 1], self.lowest_torque)
+        losses = self.loss(omega_1=x[:, 0] * RPM, torque=torque, T_1=x[:, 2], T_2=x[:, 3])
         return np.stack(losses, axis=-1)
 
     def solve(self, *, omega_1: Array, torque: Array, T_1: Array, T_2: Array) -> ContactState:
@@ -337,9 +349,8 @@ class ContactState(Inlet):
     mu: Array
 
 
-def mesh_contact(gearbox: GearboxData) -> MeshContact:
-    """Return the contact of the gearbox's stage."""
-    stage = gearbox.stage[0]
+def mesh_contact(gearbox: GearboxData, stage: Stage) -> MeshContact:
+    """Return the contact of a stage of the gearbox."""
     pair, friction, material = stage.pair(), stage.friction, stage.material
     E, nu = (material.youngs_modulus,) * 2, (material.poisson,) * 2
     t, dx, share = contact_points(pair, model=stage.load_sharing, r_bore=stage.bore_radius, E=E, nu=nu)
@@ -370,18 +381,22 @@ def mesh_contact(gearbox: GearboxData) -> MeshContact:
         film=friction.film,
         thermal_reduction=friction.thermal_reduction,
         rolling_constant=stage.rolling.constant_N_m2,
+        lowest_torque=gearbox.torque_ratio[stage.driver] * TORQUE_FLOOR_NM,
     )
 
 
 def mesh_terms(gearbox: GearboxData) -> Iterator[LossTerm]:
-    """Yield the loss of the stage's mesh; it reads the bulk temperatures of both gears."""
-    inputs = (
-        TermInput("speed_rpm", SPEED),
-        TermInput("torque_Nm", TORQUE),
-        *(TermInput(f"T_{gear}_degC", gear) for gear in gearbox.stage[0].names),
-    )
-    law = mesh_contact(gearbox)
-    yield LossTerm(kind=MESH, name="mesh", components=MESH.components, node=MESH_NODE, inputs=inputs, law=law)
+    """Yield the loss of every stage's mesh; it reads the bulk temperatures of both gears."""
+    count = len(gearbox.stage)
+    components = zip(*(of_stages(component, count) for component in MESH.components), strict=True)
+    for stage, name, own in zip(gearbox.stage, of_stages(MESH_NODE, count), components, strict=True):
+        inputs = (
+            TermInput("speed_rpm", SPEED, gearbox.speed_ratio[stage.driver]),
+            TermInput("torque_Nm", TORQUE, gearbox.torque_ratio[stage.driver]),
+            *(TermInput(f"T_{gear}_degC", gear) for gear in stage.names),
+        )
+        law = mesh_contact(gearbox, stage)
+        yield LossTerm(kind=MESH, name=name, components=own, node=name, inputs=inputs, law=law)
 
 
 MESH = LossKind(

@@ -45,7 +45,22 @@ class GearboxData(Protocol):
     def ambient(self) -> Ambient: ...  # noqa: D102
     @property
     def speed_ratio(self) -> Mapping[str, float]: ...  # noqa: D102
+    @property
+    def torque_ratio(self) -> Mapping[str, float]: ...  # noqa: D102
+    @property
+    def level_below_axis(self) -> Mapping[str, float]: ...  # noqa: D102
     def lubricant(self) -> Oil: ...  # noqa: D102
+
+
+def of_stages(name: str, stages: int) -> tuple[str, ...]:
+    """Names of what every stage has: the bare name in a gearbox of one stage, else numbered.
+
+    Examples
+    --------
+    >>> of_stages("mesh", 1), of_stages("mesh", 2)
+    (('mesh',), ('mesh_1', 'mesh_2'))
+    """
+    return (name,) if stages == 1 else tuple(f"{name}_{number}" for number in range(1, stages + 1))
 
 
 class Law(Protocol):

@@ -30,6 +30,8 @@ def refuse_unsplit(gearbox: Gearbox) -> None:
             f"{gearbox.file}: has {len(gearbox.stage)} stages; the zoo splits gearboxes of one stage and definitions "
             "without geometry: give one of these"
         )
+    if any(bearing.load_share is None for bearing in gearbox.bearing):
+        raise InputError(f"{gearbox.file}: has bearings with position_mm; the zoo needs their load_share")
 
 
 class Sizes(BoxSizes):
