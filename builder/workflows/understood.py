@@ -50,9 +50,9 @@ def understood(gearbox: Gearbox) -> list[Grid]:
 
 
 def _gears(gearbox: Gearbox) -> Iterator[Grid]:
-    _, torque = _largest(gearbox)
+    (_, torque), geometry = _largest(gearbox), gearbox.geometry
     for number, stage in enumerate(gearbox.stage, start=1):
-        pair, levels = stage.pair(), [gearbox.level_below_axis[shaft] for shaft in (stage.driver, stage.driven)]
+        pair, levels = stage.pair(), [geometry.level_below_axis[shaft] for shaft in (stage.driver, stage.driven)]
         rows = [
             [name, f"{2e3 * r_a:.1f}", f"{1e3 * (r_a - level):.1f}" if r_a > level else "not at all"]
             for name, r_a, level in zip(stage.names, pair.r_a, levels, strict=True)
@@ -61,13 +61,13 @@ def _gears(gearbox: Gearbox) -> Iterator[Grid]:
         level = " and ".join(dict.fromkeys(f"{1e3 * level:g}" for level in levels))
         title = f"Gears{of_stage}; contact ratio {pair.epsilon_alpha:.3f}; oil {level} mm below their axes"
         if pair.epsilon_beta > 0.0:
-            push = torque * gearbox.torque_ratio[stage.driver] / pair.r_b[0] * math.tan(pair.beta_b)
+            push = torque * geometry.torque_ratio[stage.driver] / pair.r_b[0] * math.tan(pair.beta_b)
             title += f"\n(overlap ratio {pair.epsilon_beta:.3f}; {push:.4g} N along the shafts at {torque:g} N m)"
         yield Grid(title, ["gear", "tip diameter, mm", "dips, mm"], rows)
 
 
 def _bearing_loads(gearbox: Gearbox) -> Grid:
-    (speed, torque), loads = _largest(gearbox), bearing_loads(gearbox)
+    (speed, torque), loads = _largest(gearbox), bearing_loads(gearbox.geometry)
     rows = [
         [bearing.name, f"{speed * gearbox.speed_ratio[bearing.shaft]:.4g}", f"{torque * load.radial:.4g}",
          f"{torque * load.radial * load.axial_share:.4g}"]

@@ -196,16 +196,6 @@ class Gearbox:
         """Speed of every shaft over the speed of the input shaft, by shaft name, [-]."""
         return self.geometry.speed_ratio
 
-    @property
-    def torque_ratio(self) -> Mapping[str, float]:
-        """Torque of every shaft without losses over the torque of the input shaft, by shaft name, [-]."""
-        return self.geometry.torque_ratio
-
-    @property
-    def level_below_axis(self) -> Mapping[str, float]:
-        """Oil level below the axis of every shaft, by shaft name, [m]."""
-        return self.geometry.level_below_axis
-
     def source_of(self, path: str) -> str:
         """Return where a value comes from.
 

@@ -87,7 +87,9 @@ class Bearing(Section):
             return f"{self.designation} lets the shaft move: an NJ, an NUP, a ball or a taper bearing can locate it"
         if self.type == "deep_groove_ball" and (self.S2 is None or self.static_load_kN is None):
             return "S2 of its series (SKF) and static_load_kN, the rating C0 of the catalogue, are needed"
-        return "its load_share is 0, and a locating bearing carries a radial load too" if self.load_share == 0.0 else None
+        return (
+            "its load_share is 0, and a locating bearing carries a radial load too" if self.load_share == 0.0 else None
+        )
 
     @property
     def sliding_constant(self) -> float:

@@ -129,8 +129,7 @@ TEXTS: Mapping[str, Mapping[str, KeyText]] = {
         bore_mm=("Bores of both gears, for the compliance of their bodies", "15 to 150"),
         position_mm=("Middle of the gear along the driving and along the driven shaft, where bearings have positions",
                      "20 to 300"),
-        angle_deg=("Angle between the centre lines of this stage and the one before, seen along their common shaft: "
-                   "180 if it goes on in one plane, 0 if it comes back", "180"),
+        angle_deg=("Angle between its centre line and that of the stage before: 180 in one plane, 0 folded back", "180"),
         roughness_Ra_um=("Arithmetic mean roughness of the flanks (driver, driven)", "0.2 to 0.8 (ground)"),
         material="Steel of the gears",
         load_sharing="Law of the load on one pair of teeth along the path of contact",
