@@ -46,7 +46,7 @@ def understood(gearbox: Gearbox) -> list[Grid]:
     tables = [_nodes(gearbox, network), _links(gearbox, network), _inputs(network), _heats(gearbox, network)]
     if "oil" in {part.name for part in network.parts}:
         tables.append(_oil(gearbox))
-    return tables if gearbox.is_parametric else [*tables, *_gears(gearbox), _bearing_loads(gearbox)]
+    return tables if gearbox.is_parametric else [*tables, _bearing_loads(gearbox), *_gears(gearbox)]
 
 
 def _gears(gearbox: Gearbox) -> Iterator[Grid]:

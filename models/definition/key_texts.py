@@ -104,6 +104,7 @@ TEXTS: Mapping[str, Mapping[str, KeyText]] = {
         film="Formula of the film thickness",
         thermal_reduction="Reduction of the film by heating of the inlet",
         average="Over what the friction power is averaged",
+        load_floor="false: Schlenk's friction falls with the load below the 150 N/mm of ISO/TR 14179-2 too",
     ),
     "Rolling": _texts(
         model="Law of the rolling loss",
@@ -129,7 +130,7 @@ TEXTS: Mapping[str, Mapping[str, KeyText]] = {
         bore_mm=("Bores of both gears, for the compliance of their bodies", "15 to 150"),
         position_mm=("Middle of the gear along the driving and along the driven shaft, where bearings have positions",
                      "20 to 300"),
-        angle_deg=("Angle between its centre line and that of the stage before: 180 in one plane, 0 folded back", "180"),
+        angle_deg=("Angle of its centre line to that of the stage before: 180 in one plane, 0 folded back", "180"),
         roughness_Ra_um=("Arithmetic mean roughness of the flanks (driver, driven)", "0.2 to 0.8 (ground)"),
         material="Steel of the gears",
         load_sharing="Law of the load on one pair of teeth along the path of contact",

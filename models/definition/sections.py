@@ -249,6 +249,7 @@ class Friction(Section):
     film: Literal["hamrock_dowson", "dowson_toyoda", "grubin"] = "hamrock_dowson"
     thermal_reduction: Literal["gupta", "gupta_simple", "murch_wilson"] = "gupta"
     average: Literal["base_pitch", "path_of_contact"] = "base_pitch"
+    load_floor: bool | None = None
 
 
 class Rolling(Section):
@@ -288,7 +289,7 @@ class Stage(Section):
     angle_deg: Annotated[float, between(-180.0, 180.0)] | None = None
     roughness_Ra_um: tuple[Annotated[float, between(0.01, 20.0)], Annotated[float, between(0.01, 20.0)]]
     material: Material = Material()
-    load_sharing: Literal["potential_energy", "sanchez_pedrero", "equal"]
+    load_sharing: Literal["potential_energy", "sanchez_pedrero", "equal", "ohlendorf"]
     friction: Friction
     rolling: Rolling
     churning: Churning

@@ -37,14 +37,22 @@ Roughness = Literal["of_the_law", "mean", "composite", "composite_rms"]
 
 
 def friction_schlenk(
-    *, F_bt_per_b: Numeric, v_sum_C: Numeric, rho_red_C: float, eta_oil: Numeric, Ra: float, X_L: float
+    *,
+    F_bt_per_b: Numeric,
+    v_sum_C: Numeric,
+    rho_red_C: float,
+    eta_oil: Numeric,
+    Ra: float,
+    X_L: float,
+    lowest_load: float = SCHLENK_LOWEST_LOAD,
 ) -> Array:
     r"""Mean friction coefficient of a mesh after Schlenk (ISO/TR 14179-2).
 
     .. math:: \mu_{mZ} = 0.048\left(\frac{F_{bt}/b}{v_{\Sigma C}\,\rho_{redC}}\right)^{0.2}
               \eta_{oil}^{-0.05} Ra^{0.25} X_L
 
-    with the units of the standard (N/mm, m/s, mm, mPa s, um); ``F_bt / b`` counts as 150 N/mm at least.
+    with the units of the standard (N/mm, m/s, mm, mPa s, um); ``F_bt / b`` counts as 150 N/mm at least. WTplus knows
+    no such floor: its map of an e-axle is reproduced without one (tests/validation).
 
     Parameters
     ----------
@@ -60,6 +68,8 @@ def friction_schlenk(
         Mean arithmetic roughness of both flanks, [m]
     X_L : float
         Lubricant factor, [-]; 1 for mineral oil
+    lowest_load : float
+        Least force per face width that counts, [N/m]
 
     Returns
     -------
@@ -79,7 +89,7 @@ def friction_schlenk(
     ...                              Ra=0.1655e-6, X_L=1.0)), 4)
     0.035
     """
-    load = np.maximum(F_bt_per_b, SCHLENK_LOWEST_LOAD) * 1e-3 / (np.asarray(v_sum_C) * rho_red_C * 1e3)
+    load = np.maximum(F_bt_per_b, lowest_load) * 1e-3 / (np.asarray(v_sum_C) * rho_red_C * 1e3)
     return np.asarray(0.048 * load**0.2 * (np.asarray(eta_oil) * 1e3) ** -0.05 * (Ra * 1e6) ** 0.25 * X_L)
 
 
@@ -161,6 +171,7 @@ class MeshContact:
     thermal_reduction: ThermalReduction = "gupta"
     rolling_constant: float = 9.0e7
     lowest_torque: float = TORQUE_FLOOR_NM
+    lowest_load: float = SCHLENK_LOWEST_LOAD
 
     def power(self, x: Array) -> Array:
         """Sliding and rolling loss [W], (N, 2), at speed [1/min], torque [N m], gear temperatures [degC], (N, 4).
@@ -244,6 +255,7 @@ class MeshContact:
                 eta_oil=self.oil.dynamic_viscosity(0.5 * (T_1 + T_2)),
                 Ra=0.5 * (self.Ra[0] + self.Ra[1]),
                 X_L=self.oil.schlenk_X_L,
+                lowest_load=self.lowest_load,
             )[:, None]
         else:
             state = self.solve(omega_1=omega_1, torque=torque, T_1=T_1, T_2=T_2)
@@ -382,6 +394,7 @@ def mesh_contact(gearbox: GearboxData, stage: Stage) -> MeshContact:
         thermal_reduction=friction.thermal_reduction,
         rolling_constant=stage.rolling.constant_N_m2,
         lowest_torque=gearbox.torque_ratio[stage.driver] * TORQUE_FLOOR_NM,
+        lowest_load=0.0 if friction.load_floor is False else SCHLENK_LOWEST_LOAD,
     )
 
 

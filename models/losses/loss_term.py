@@ -31,7 +31,7 @@ SPEED, TORQUE = "speed", "torque"
 
 
 class GearboxData(Protocol):
-    """The tables of a definition that loss terms are made from; :class:`~models.assembly.gearbox_definition.Definition` is one."""
+    """Tables that loss terms are made from; a :class:`~models.assembly.gearbox_definition.Definition` has them."""
 
     @property
     def stage(self) -> tuple[Stage, ...]: ...  # noqa: D102

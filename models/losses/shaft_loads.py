@@ -68,7 +68,7 @@ def bearing_loads(gearbox: GearboxData) -> dict[str, BearingLoad]:
 
     References
     ----------
-    Balance of forces and moments. FVA "WTplus" takes loads from the same beam; checked against its e-axle, tests/validation.
+    Balance of forces and moments, as in every textbook of machine elements.
     """
     return {name: load for shaft in gearbox.torque_ratio for name, load in _of_shaft(gearbox, shaft)}
 
