@@ -8,11 +8,23 @@ from functools import cached_property
 import numpy as np
 
 from models.assembly.gearbox import Gearbox
+from models.base.errors import InputError
 from models.definition.bearing_section import Bearing
 from models.definition.sections import Shaft
 from models.formulas.geometry import GearPair
 
 T_SERVICE = 60.0  # degC, where the properties of the oil are taken that plants hold constant
+
+
+def refuse_unbuilt(gearbox: Gearbox) -> None:
+    """Raise InputError for a definition with geometry that no plant is built of."""
+    if (count := len(gearbox.stage)) > 1:
+        raise InputError(
+            f"{gearbox.file}: has {count} stages; concealed cases are made of gearboxes of one stage, in the zoo of "
+            "definitions without geometry too: give one of these"
+        )
+    if any(bearing.load_share is None for bearing in gearbox.bearing):
+        raise InputError(f"{gearbox.file}: has bearings with position_mm; concealed cases need their load_share")
 
 
 @dataclass(frozen=True)
@@ -22,7 +34,7 @@ class BoxSizes:
     Parameters
     ----------
     gearbox : Gearbox
-        With geometry; only its first stage counts
+        With geometry, of one stage
     """
 
     gearbox: Gearbox
