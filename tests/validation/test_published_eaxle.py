@@ -40,7 +40,7 @@ def test_the_map_of_the_eaxle_is_reproduced() -> None:
 
 
 def test_the_two_named_options_matter() -> None:
-    """The floor of ISO/TR 14179-2 lifts friction by (150 N/mm over the load)^0.2, slices by load off the pitch point."""
+    """The floor of ISO/TR 14179-2 lifts friction by (150 N/mm over the load)^0.2."""
     gearbox = load_gearbox(EXAMPLES / "wtplus_eaxle.toml")
     torque = 1010.0 * gearbox.speed_ratio["wheel_shaft"]
     point = {"speed": 8763.0, "torque": torque, "temperatures": 25.0}
