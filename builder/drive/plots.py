@@ -51,7 +51,7 @@ def plot_cycle(
         A result in the columns of the file contract
     title : str
     groups : mapping of str to tuple of str
-        Nodes that are drawn together, e.g. ``bearings``; of each group the first and the last are drawn
+        Nodes that are alike, e.g. ``bearings``; of each group the first, the last and the hottest are drawn
     inputs : mapping of str to Input
         Of the machine; the first two that drive it are drawn
     reference : mapping of column name to Array, or None
@@ -68,8 +68,10 @@ def plot_cycle(
         moving = [i.quantity for i in inputs.values() if not i.quantity.is_temperature]
         labels = {q.column: q.label for q in moving or [i.quantity for i in inputs.values()]}
         draw_inputs(driving, time, columns, labels)
+        curves_of = temperature_curves(columns)
         hidden = {node for group in groups.values() for node in group[1:-1]} | {"air", "frame"}
-        shown = {node: curve for node, curve in temperature_curves(columns).items() if node not in hidden}
+        hidden -= {max(group, key=lambda node: columns[f"T_{node}_degC"].max()) for group in groups.values() if group}
+        shown = {node: curve for node, curve in curves_of.items() if node not in hidden}
         drawn = [(losses, "losses", loss_curves(columns)) for losses in between]
         for axes, what, curves in (*drawn, (temperatures, "temperatures", shown)):
             draw_curves(axes, time, curves, members(columns, what))

@@ -16,7 +16,7 @@ import numpy as np
 from builder.base import console
 from builder.drive.driver import drive_fmu, runs_here
 from builder.drive.plots import plot_cycle
-from builder.fmi.reference_cycle import COLD_START, reference_cycle
+from builder.fmi.reference_cycle import COLD_START, KNOTS, reference_cycle
 from builder.native.compile import NoCompilerError, plan_for
 from builder.native.native_fmu import build_native_fmu
 from builder.python.python_fmu import build_python_fmu
@@ -147,6 +147,15 @@ class BuildReport:
         )
         console.out.print(f"networks: {training.origin}\n")
 
+    def _covered(self) -> str:
+        """What of the range of training the cycle reaches."""
+        if self.training is None:
+            return ""
+        losses, (speed, torque) = self.training.losses, KNOTS[:, 1:].max(axis=0)
+        (_, n), (_, M) = losses.speed_bounds, losses.torque_bounds
+        reached = f"up to {speed * n:.4g} 1/min of {n:g}, {torque * M:.4g} N m of {M:g}"
+        return f"\n({reached}; the errors of the networks are those of the whole range)"
+
     def _show_cycles(self) -> None:
         worst = [max(cycle.temperature_K.items(), key=lambda item: item[1]) for cycle in self.cycles.values()]
         cycles = self.cycles.values()
@@ -159,7 +168,7 @@ class BuildReport:
             known = [f"{100.0 * value:.2f} %" for value in values if value is not None]
             rows += [[f"total loss, {label}", *known]] if known else []
         console.table(
-            "FMU against the full model, 600 s reference cycle from 20 °C",
+            f"FMU against the full model, 600 s reference cycle from 20 °C{self._covered()}",
             ["quantity", *(f"difference, {name}" for name in self.cycles)],
             rows,
         )

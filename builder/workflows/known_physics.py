@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError, did_you_mean
@@ -12,6 +13,7 @@ from models.network.laws import Parameter
 from models.quantities.units import behind_a_number
 from models.simulation.thermal_network import ThermalNetwork
 
+COLDEST_KNOWN, HOTTEST_KNOWN = -60.0, 150.0  # degC, of coolants and set-points that are known
 Given = tuple[float, float]  # value and standard error
 
 
@@ -45,13 +47,16 @@ def known_finding(
         if key not in own:
             raise InputError(f"{name} has no parameter {key!r}{did_you_mean(key, own)}; it has {', '.join(own)}")
         p = own[key]
-        if not p.lower <= value <= p.upper:
+        if p.unit == "degC" and COLDEST_KNOWN <= value <= HOTTEST_KNOWN:  # limits are those of a guess
+            own[key] = replace(p, lower=min(p.lower, value), upper=max(p.upper, value))
+        elif not p.lower <= value <= p.upper:
             limits = f"{p.lower:.4g} to {p.upper:.4g}{behind_a_number(p.unit)}"
             raise InputError(f"{key} = {value:g} is outside {limits} of {name}")
     strength = term.strength
     if _local(term, strength) not in given:
         raise InputError(f"the strength of {name} is missing: {strength.description or 'its size'} [{strength.unit}], "
                          f"usually about {strength.sd:.2g} on such a machine; give --set strength=VALUE")  # fmt: skip
+    term = replace(term, parameters=tuple(own.values()))
     typical = {key: (p.start, p.sd * p.start if p.log else p.sd) for key, p in own.items()}
     estimates = {own[key].name: number for key, number in (typical | dict(given)).items()}
     return Finding.of(term, estimates, mechanism=name, family=term.family, place=term.place, says=term.says)

@@ -21,6 +21,7 @@ from models.simulation.thermal_network import ThermalNetwork
 SHARES = (("low", 0.1), ("mid", 0.5), ("rated", 1.0))  # of the largest speed, torque and other inputs
 WARM_degC = 60.0  # of all parts, where the definition states no other temperature
 OIL_degC = (20.0, 60.0, 100.0)
+HOTTEST_DEGC = 250.0  # beyond it nothing of a gearbox is left, and no formula holds
 SHOWN_WHOLE = 1000.0  # from which numbers have no decimals
 TYPICAL = "typical"  # first word of the source of a value that is no machine's own
 
@@ -46,7 +47,25 @@ def understood(gearbox: Gearbox) -> list[Grid]:
     tables = [_nodes(gearbox, network), _links(gearbox, network), _inputs(network), _heats(gearbox, network)]
     if "oil" in {part.name for part in network.parts}:
         tables.append(_oil(gearbox))
-    return tables if gearbox.is_parametric else [*tables, _bearing_loads(gearbox), *_gears(gearbox)]
+    return tables if gearbox.is_parametric else [*tables, _steady(gearbox), _bearing_loads(gearbox), *_gears(gearbox)]
+
+
+def _steady(gearbox: Gearbox) -> Grid:
+    """Where temperatures settle; nowhere, where losses rise faster than heat leaves."""
+    parts = ["oil", *(part.name for part in gearbox.housing.part)]
+    rows: list[list[str]] = [[name] for name in [*parts, "hottest bearing"]]
+    for _, share in SHARES:
+        speed, torque = (share * value for value in _largest(gearbox))
+        try:
+            T = gearbox.steady_state(speed=speed, torque=torque).temperatures
+        except ArithmeticError:
+            T = dict.fromkeys((*parts, *(bearing.name for bearing in gearbox.bearing)), math.inf)
+        hottest = max(gearbox.bearing, key=lambda bearing: T[bearing.name]).name
+        shown = [f"{T[name]:.1f}" if T[name] <= HOTTEST_DEGC else f"> {HOTTEST_DEGC:g}" for name in (*parts, hottest)]
+        for row, value in zip(rows, [*shown[:-1], f"{shown[-1]} ({hottest})"], strict=True):
+            row.append(value)
+    air = f"{gearbox.ambient_degC:g} degC ambient and {gearbox.ambient.air_speed_m_s:g} m/s of air"
+    return Grid(f"Where temperatures settle, in degC, at {air}", ["part", *(name for name, _ in SHARES)], rows)
 
 
 def _gears(gearbox: Gearbox) -> Iterator[Grid]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Set
+from collections.abc import Collection, Iterator, Set
 from pathlib import Path
 
 from diagnosis.recordings.columns import quantities_of
@@ -18,9 +18,11 @@ from models.files.cycle import Cycle
 from models.files.cycle_file import RecordedStart, read_cycle_and_start
 from models.files.paths import KINDS
 from models.files.table_file import column_names
-from models.quantities.quantities import is_total_loss, node_of_channel
+from models.quantities.quantities import TOTAL_LOSS, column_of, is_total_loss, node_of_channel
 
 MOST_SHOWN = 3  # pieces of a recording with gaps
+GIVEN = "given as one"  # a mapping, or the form of the name
+RESULT = "in_domain"  # column that results of a simulation have
 
 
 def read_cycle_or_recording(
@@ -51,9 +53,15 @@ def read_cycle_or_recording(
         With all problems of the file; or if a recording has gaps, with the pieces between them.
     """
     needed = {STANDARD, *(given.column for given in network.inputs.values() if given.required)}
-    if mapping is None and not _is_recording(text, needed, network):
-        return *read_cycle_and_start(text, network.inputs), ()
-    recording = read_recording(text, network, mapping=mapping, to_compare=False)
+    because = GIVEN if mapping is not None else _what_makes_a_recording(text, needed, network)
+    if not because:
+        return *read_cycle_and_start(text, network.inputs), tuple(_unused(column_names(text), network))
+    try:
+        recording = read_recording(text, network, mapping=mapping, to_compare=False)
+    except InputError as error:
+        if because == GIVEN:
+            raise
+        raise InputError(f"{error}\n{text}: is read as a recording, because it has {because}") from error
     if len(recording.segments) > 1:
         raise InputError(f"{text}: {_gaps(recording)}")
     piece = recording.segments[0]
@@ -68,27 +76,40 @@ def read_cycle_or_recording(
     return cycle, start, (*recording.notes, *_clock_notes(recording))
 
 
-def _is_recording(text: Path, needed: Set[str], network: RecordedMachine) -> bool:
-    """Return True if a file must be read as a recording.
+def _what_makes_a_recording(text: Path, needed: Set[str], network: RecordedMachine) -> str:
+    """Why a file must be read as a recording; empty for a plain cycle.
 
     So are parts, joined files and formats other than tables; files with a column that a mapping names; and files that
     lack columns of a plain cycle, but have a mapping next to them, dates, or names with other units.
     """
     if not text.name.lower().endswith(KINDS) or len(split_path(text)[0]) > 1:
-        return True
+        return GIVEN
     names, own = set(column_names(text)), mapping_beside(text, name_parts(text)[1])
     if own is not None:
         # The mapping may be there for other files of the folder.
         as_it_reads = column_names(text, own.text_form)
         is_meant = not (_named(own) or needed).isdisjoint(as_it_reads)
-        return is_meant or not names.issuperset(needed)
+        return "a mapping next to it" if is_meant or not names.issuperset(needed) else ""
     if not names:  # the reader of plain cycles reports why
-        return False
+        return ""
     lacking = [quantity for quantity in quantities_of(network).values() if quantity.column not in names]
-    if named_with_unit(list(names), lacking) or any(unit_of_name(name, "time", "time", "s") for name in names - needed):
-        return True
-    has_dates = STANDARD not in names and not names.isdisjoint(ISO_NAMES)
-    return has_dates or not names.isdisjoint(_named(mapping_of_definition(network.recording)))
+    with_unit = [*named_with_unit(list(names), lacking)]
+    with_unit += sorted(name for name in names - needed if unit_of_name(name, "time", "time", "s"))
+    if with_unit:
+        return f"{', '.join(with_unit)}; columns of a plain cycle are {', '.join(sorted(needed))} ..."
+    if STANDARD not in names and not names.isdisjoint(ISO_NAMES):
+        return "dates"
+    meant = names & _named(mapping_of_definition(network.recording))
+    return f"{', '.join(sorted(meant))}, which the definition maps" if meant else ""
+
+
+def _unused(names: Collection[str], network: RecordedMachine) -> Iterator[str]:
+    """A note on columns of a plain cycle that nothing reads; a result of a simulation has many."""
+    inputs = [given.column for given in network.inputs.values()]
+    own = {STANDARD, *inputs, *(column_of(f"T_{part.name}") for part in network.parts), column_of(TOTAL_LOSS)}
+    others = [name for name in names if name not in own]
+    if others and RESULT not in names:
+        yield f"not used: {', '.join(others)}; the model's inputs are {', '.join(inputs)}"
 
 
 def _named(mapping: RecordingMapping) -> set[str]:

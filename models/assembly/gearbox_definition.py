@@ -302,10 +302,17 @@ def _gears_in_housing(definition: Definition) -> Iterator[str]:
 def _oil_level(definition: Definition) -> Iterator[str]:
     """Refuse an oil level outside the housing."""
     level, height = definition.oil.level_below_axis_mm, 1e3 * definition.housing.height_m
-    if abs(level) > height:
+    # An axis is at least as far from floor and lid as the gear on it is large.
+    rooms = [
+        (1e3 * definition.level_below_axis[shaft] - level, height - 1e3 * r_a)
+        for stage in definition.stage
+        for shaft, r_a in zip((stage.driver, stage.driven), stage.pair().r_a, strict=True)
+    ]
+    low, high = max(-room - lift for lift, room in rooms), min(room - lift for lift, room in rooms)
+    if not low <= level <= high:
         yield (
             f"oil.level_below_axis_mm: {level:g} mm is outside the housing, whose height_m is {1e-3 * height:g}; "
-            f"{-height:g} to {height:g} mm is possible (positive below the axis)"
+            f"with its gears {low:.4g} to {high:.4g} mm is possible (positive below the axis)"
         )
 
 

@@ -38,7 +38,7 @@ class Bearing(Section):
     outside_diameter_mm: Annotated[float, between(3.0, 2000.0)]
     width_mm: Annotated[float, between(1.0, 500.0)]
     mass_kg: Annotated[float, between(0.001, 1000.0)]
-    model: Literal["skf"]
+    model: Literal["skf"] = "skf"
     R1: Annotated[float, between(1e-8, 1e-4)]
     S1: Annotated[float, between(1e-5, 1.0)] | None = None
     S2: Annotated[float, between(1e-5, 1000.0)] | None = None

@@ -14,7 +14,7 @@ from models.base.types import Array
 from models.columns.columns import Columns
 from models.files.table_file import MOST_ROWS
 from models.quantities.column_names import meant
-from models.quantities.quantities import GEARBOX_INPUTS, Input, column_of_input
+from models.quantities.quantities import GEARBOX_INPUTS, Input, column_of_input, implausible
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -131,7 +131,8 @@ class Cycle:
                 if len(values) != len(time):
                     problems.add(f"{wanted[signal]} has {len(values)} rows, but time_s has {len(time)}")
         for signal, values in arrays.items():
-            _check_range(inputs[signal], values, problems)
+            if fault := implausible(inputs[signal].quantity, values):
+                problems.add(fault)
         problems.stop_if_any()
         return cls(cast(Array, time), arrays)
 
@@ -186,6 +187,14 @@ def _rounded_up(seconds: float) -> str:
     return f"{np.ceil(seconds / unit) * unit:g}"
 
 
+def _is_number(value: object) -> bool:
+    try:
+        float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        return False
+    return True
+
+
 def _check_names(have: list[str], wanted: list[str], needed: list[str], problems: Problems) -> None:
     for column in needed:
         if column not in have:
@@ -208,21 +217,12 @@ def _check_time(time: Array, problems: Problems) -> None:
         )
 
 
-def _check_range(given: Input, values: Array, problems: Problems) -> None:
-    quantity = given.quantity
-    column, low, high = quantity.column, quantity.low, quantity.high
-    unit = f"{quantity.unit}; {quantity.note}" if quantity.note else quantity.unit
-    wrong = np.flatnonzero((values < low) | (values > high))
-    if len(wrong):
-        row = int(wrong[0])
-        problems.add(f"{column} is {values[row]:g} at row {row + 1}; {low:g} ... {high:g} is possible ({unit})")
-
-
 def _numbers(values: ArrayLike, column: str, problems: Problems) -> Array | None:
     try:
         numbers = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        problems.add(f"{column} holds something that is not a number ({error})")
+    except (TypeError, ValueError):
+        row, value = next((row, value) for row, value in enumerate(np.ravel(values), start=1) if not _is_number(value))
+        problems.add(f"{column} is {str(value)[:40]!r} at row {row}; numbers are needed")
         return None
     if numbers.ndim != 1:
         problems.add(f"{column} has shape {numbers.shape}; one value per row is needed")

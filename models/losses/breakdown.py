@@ -13,7 +13,7 @@ from models.base.shapes import common_shape
 from models.base.types import Numeric
 from models.columns.columns import Columns
 from models.network.structure import Losses
-from models.quantities.quantities import TOTAL_LOSS, column_of, column_of_input
+from models.quantities.quantities import TOTAL_LOSS, column_of, column_of_input, implausible, quantity_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -88,7 +88,7 @@ def break_down(
     Raises
     ------
     InputError
-        If a node is missing or unknown, or a value unphysical.
+        If a node is missing or unknown, or a value not plausible.
     """
     nodes = losses.temperature_nodes
     if not isinstance(temperatures, Mapping):
@@ -100,7 +100,16 @@ def break_down(
     missing = [name for name in nodes if name not in temperatures]
     if missing:
         raise InputError(f"the temperatures of {', '.join(missing)} are missing; give them in degC")
-    common_shape({"speed": speed, "torque": torque, **{f"T_{name}": temperatures[name] for name in nodes}})
+    values: dict[str, ArrayLike] = {
+        "speed": speed,
+        "torque": torque,
+        **{f"T_{name}": temperatures[name] for name in nodes},
+    }
+    common_shape(values)
+    for name, value in values.items():
+        quantity = quantity_of(name)
+        if quantity is not None and (fault := implausible(quantity, value)):
+            raise InputError(fault)
     columns = np.broadcast_arrays(*(np.asarray(temperatures[name], dtype=float) for name in nodes))
     power = losses.power(speed, torque, np.stack(columns, axis=-1))
 

@@ -69,7 +69,9 @@ def part_colours(parts: Iterable[str]) -> dict[str, str]:
         family = _family(part)
         families.setdefault(part if few and family not in HUES else family, []).append(part)
     others = [family for family in families if family not in HUES]
-    hues = {**HUES, **{family: OTHER_HUES[i % len(OTHER_HUES)] for i, family in enumerate(others)}}
+    taken = {HUES[family] for family in families if family in HUES}
+    free = sorted(OTHER_HUES, key=lambda hue: hue in taken)  # those that no known part has first
+    hues = {**HUES, **{family: free[i % len(free)] for i, family in enumerate(others)}}
     return {
         part: colour
         for family, members in families.items()

@@ -11,6 +11,9 @@ from dataclasses import dataclass, replace
 from math import inf
 from typing import Literal
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from models.quantities.units import INSIDE, find_unit
 
 Observed = Literal["input", "temperature", "total loss", "computed"]
@@ -217,6 +220,29 @@ def usual_inputs(**defaults: float) -> dict[str, Input]:
 REQUIRED = ("speed", "torque")  # of a machine that has them
 # Of a gearbox with geometry; the air's are those of its definition.
 GEARBOX_INPUTS: Mapping[str, Input] = usual_inputs(speed=0.0, torque=0.0, T_ambient=20.0, air_speed=0.0)
+
+
+def implausible(quantity: Quantity, values: ArrayLike) -> str | None:
+    """Return a sentence on the first value outside the plausible range of a quantity; None if there is none.
+
+    Parameters
+    ----------
+    values : ArrayLike, shape () or (N,)
+        In the unit inside
+
+    Examples
+    --------
+    >>> implausible(QUANTITIES[2], [20.0, 293.15])
+    'T_ambient_degC is 293.15 at row 2; -90 ... 200 is possible (degC; kelvin are not meant)'
+    >>> implausible(QUANTITIES[2], 20.0)
+    """
+    numbers = np.asarray(values, dtype=float)
+    wrong = np.flatnonzero(~((numbers >= quantity.low) & (numbers <= quantity.high)))
+    if not len(wrong):
+        return None
+    first, row = numbers.ravel()[wrong[0]], f" at row {wrong[0] + 1}" if numbers.ndim else ""
+    unit = f"{quantity.unit}; {quantity.note}" if quantity.note else quantity.unit
+    return f"{quantity.column} is {first:g}{row}; {quantity.low:g} ... {quantity.high:g} is possible ({unit})"
 
 
 def quantity_of(name: str) -> Quantity | None:

@@ -15,6 +15,7 @@ from models.definition.sections import Training
 from models.network.structure import Losses, Network
 from models.portable import solver
 from models.portable.evaluation import NetworkSystem
+from models.quantities.quantities import implausible
 from models.simulation.result import Result, SteadyState
 from models.simulation.simulate import evaluate, network_system, surroundings
 
@@ -119,7 +120,7 @@ def _inputs(
     """Inputs in the order of the network, their defaults filled in."""
     shaft = {"speed": speed, "torque": torque}
     given = {name: value for name, value in shaft.items() if value is not None} | dict(others)
-    for name in given:
+    for name, value in given.items():
         if name in network.derived:
             sources = {s.name for s in network.derived[name].free_symbols} & set(network.inputs)
             needed = ", ".join(f"{source!r}: ..." for source in sorted(sources - {"speed"}))
@@ -128,6 +129,8 @@ def _inputs(
             )
         if name not in network.inputs:
             raise InputError(f"{name!r} is not an input of this network{did_you_mean(name, network.inputs)}")
+        if fault := implausible(network.inputs[name].quantity, value):
+            raise InputError(fault)
     given = {"speed": 0.0, "torque": 0.0} | given
     return [given.get(name, known.default) for name, known in network.inputs.items()]
 

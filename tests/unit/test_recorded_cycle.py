@@ -118,7 +118,7 @@ def test_a_parquet_file_beside_a_mapping_of_others_is_a_plain_cycle(tmp_path: Pa
 def test_a_plain_cycle_of_a_gearbox_whose_definition_maps_columns(tmp_path: Path, turbine: ThermalNetwork) -> None:
     path = plain(tmp_path / "run.csv", table().assign(T_outdoor=5.0))
     cycle, start, notes = read_cycle_or_recording(path, turbine)
-    assert notes == ()
+    assert notes == ("not used: T_pinion_degC; the model's inputs are speed_rpm, torque_Nm, T_ambient_degC, T_outdoor",)
     assert set(cycle.inputs) == {"speed", "torque", "T_ambient", "T_outdoor"}
     assert start.temperatures == {"oil": 40.0, "pinion": 45.0}
 
@@ -316,3 +316,21 @@ def test_names_with_other_units_are_read_as_in_a_diagnosis(
     cycle, start, _ = read_cycle_or_recording(plain(tmp_path / "run.csv", given.rename(columns=names)), network)
     np.testing.assert_allclose(cycle.inputs["torque"], table()["torque_Nm"])
     assert start.temperatures["oil"] == pytest.approx(40.0)
+
+
+def test_columns_that_nothing_reads_are_named(tmp_path: Path, network: ThermalNetwork) -> None:
+    path = plain(tmp_path / "run.csv", table().assign(frame_T_in=65.0, note="x"))
+    assert read_cycle_or_recording(path, network)[2] == (
+        "not used: frame_T_in, note; the model's inputs are speed_rpm, torque_Nm, T_ambient_degC, air_speed_m_s",
+    )
+    result = plain(tmp_path / "result.csv", table().assign(P_loss_W=1.0, torque_loss_Nm=0.1, in_domain=True))
+    assert read_cycle_or_recording(result, network)[2] == ()
+
+
+def test_what_makes_a_file_a_recording_is_named_where_it_cannot_be_read(
+    tmp_path: Path, network: ThermalNetwork
+) -> None:
+    path = tmp_path / "run.csv"
+    path.write_text("time_s,speed_rpm,torque_Nm,T_ambient_K\n0,1000,50,293\n60,1000,50,293\n", encoding="utf-8")
+    with pytest.raises(InputError, match="a recording has 3 or more\n.*as a recording, because it has T_ambient_K;"):
+        read_cycle_or_recording(path, network)

@@ -96,3 +96,15 @@ def test_what_is_there_is_not_added_twice(file: Path, run_cli: RunCli, capsys: p
     assert "has fan_thermostat at housing already; change its numbers there" in capsys.readouterr().err
     assert file.read_bytes() == before
     assert run_cli("add", file.with_suffix(".csv"), *FAN) == 2
+
+
+def test_a_warm_coolant_that_is_known_is_no_guess(
+    fzg: Gearbox, file: Path, run_cli: RunCli, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The limits of a search for an unknown cooler end 20 K above the air."""
+    assert run_cli("add", file, "cooler_constant", "--set", "strength=60", "--set", "coolant=65") == 0
+    network = read_correction(file, fzg).apply(fzg.network())
+    assert fzg.steady_state(network=network).temperatures["oil"] > 35.0  # at rest in air of 27 degC
+    file.unlink()
+    assert run_cli("add", file, "cooler_constant", "--set", "strength=60", "--set", "coolant=338") == 2
+    assert "coolant = 338 is outside -3 to 47 degC" in capsys.readouterr().err

@@ -250,3 +250,10 @@ def test_another_designation_changes_the_bearing(fzg: Gearbox) -> None:
     assert other[1] == fzg.bearing[1]
     with pytest.raises(InputError, match="sizes of 'NU 999' are not known"):
         fzg.with_values({"bearing.0.designation": "NU 999"})
+
+
+def test_kelvin_are_not_taken_for_degrees_in_python_either(fzg: Gearbox) -> None:
+    with pytest.raises(InputError, match=r"T_oil_degC is 333.15; -90 ... 250 is possible"):
+        fzg.losses_at(speed=1500.0, torque=94.0, temperatures=333.15)
+    with pytest.raises(InputError, match=r"T_ambient_degC is 293.15 at row 2; -90 ... 200 is possible .*kelvin"):
+        fzg.steady_state(speed=1500.0, torque=94.0, inputs={"T_ambient": [20.0, 293.15]})

@@ -108,7 +108,7 @@ def test_operating_points_that_no_machine_has_are_refused(gearbox):
     """As with geometry."""
     at = {"speed": 1500.0, "torque": 5000.0, "temperatures": 60.0}
     for name, value in (("speed", np.nan), ("torque", np.inf), ("temperatures", -300.0)):
-        with pytest.raises(InputError, match="at operating point 0; finite numbers"):
+        with pytest.raises(InputError, match="is possible"):
             gearbox.losses_at(**at | {name: value})
     with pytest.raises(InputError, match="numbers of values differ: speed 2, torque 3"):
         gearbox.losses_at(speed=[1.0, 2.0], torque=[1.0, 2.0, 3.0], temperatures=60.0)

@@ -66,3 +66,8 @@ def test_what_cannot_be_drawn(what: Any, only: Any, message: str) -> None:
     with pytest.raises(InputError, match="no loss to draw"):
         Columns(time_s=TIME).plot("losses")
     assert not plt.get_fignums()
+
+
+def test_parts_of_other_families_do_not_have_the_colour_of_a_known_one() -> None:
+    colours = part_colours(["oil", "case", "pinion", "in_a", "flange", "bearing_1"])
+    assert len(set(colours.values())) == len(colours)

@@ -155,7 +155,7 @@ FAULTS = [
     ("[[node]]", '[[node]]\nname = "mesh"\nheat_capacity_J_K = 1.0\n[[node]]', "node: 'mesh' is overridden 2 times"),
     ("h_air =", "h_iar =", "factors: 'h_iar' ; did you mean 'h_air'?"),
     ("mesh = { value = 1.0", "mesh = { value = -1.0", "factors.mesh: -1 is below 0.001"),
-    ("value = 19.0, sd", "value = 250.0, sd", "oil.level_below_axis_mm: 250 mm height_m is 0.215; -215 to 215 mm"),
+    ("value = 19.0, sd", "value = 250.0, sd", "oil.level_below_axis_mm: 250 mm height_m is 0.215; -155.8 to 155.8 mm"),
     ("volume_l = { value = 0.9,", "volume_l = { value = 900.0,", "oil.volume_l: 900 l do not fit even a ball 5.41 l"),
     ("load_share = { value = 0.5,", "load_share = { value = 0.4,", "bearing: load_share on 'shaft_1' sum to 0.8"),
     ("[[bearing]]", THIRD_SHAFT, "shaft 'shaft_3': no stage has it as driver or driven; leave it out"),

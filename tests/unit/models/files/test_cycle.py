@@ -47,7 +47,7 @@ def test_one_row_is_a_cycle() -> None:
         ({"speed_rpm": [0.0, 3e5]}, "speed_rpm is 300000 at row 2; -200000 ... 200000 is possible"),
         ({"T_ambient_degC": [293.0, 293.0]}, "T_ambient_degC is 293 at row 1; .*kelvin are not meant"),
         ({"air_speed_m_s": [-1.0, 1.0]}, "air_speed_m_s is -1 at row 1"),
-        ({"torque_Nm": ["x", "y"]}, "torque_Nm holds something that is not a number"),
+        ({"torque_Nm": ["x", "y"]}, "numbers are needed"),
         ({"torque_Nm": [[1.0, 2.0]]}, r"torque_Nm has shape \(1, 2\); one value per row"),
         ({"torque_Nm": [1.0, 2.0, 3.0]}, "torque_Nm has 3 rows, but time_s has 2"),
     ],
