@@ -148,7 +148,7 @@ class BuildReport:
         console.out.print(f"networks: {training.origin}\n")
 
     def _covered(self) -> str:
-        """What of the range of training the cycle reaches."""
+        """Say which part of the range of training the cycle reaches."""
         if self.training is None:
             return ""
         losses, (speed, torque) = self.training.losses, KNOTS[:, 1:].max(axis=0)
