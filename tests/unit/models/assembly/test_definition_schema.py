@@ -57,7 +57,7 @@ def test_a_fault_is_found_where_it_is(old: str, new: str, place: str) -> None:
 @pytest.mark.parametrize(
     ("name", "more", "place"),
     [
-        ("fzg", '[[heat]]\nname = "x"\npart = "oil"\nheat_W = "1"', "heat"),
+        ("fzg", '[[loss]]\nname = "x"\npart = "oil"\nno_load_W = 1.0\nload_W = 1.0', "loss"),
         ("heated_rod", "[housing]\nheight_m = 0.2", "housing"),
         ("la_haute_borne", "[oil.gold]\ns = 1.0", "oil"),
         ("fzg", "[[stages]]\nz = [1, 2]", ""),
