@@ -21,6 +21,7 @@ KNOTS = np.array([
     [600.0, 0.08, 0.06],
 ])  # fmt: skip
 COLD_START = 20.0  # degC
+WARMER = 20.0  # K, of surroundings with geometry: networks of losses have a range of temperatures
 # Of inputs that the definition names, without geometry of all: time [s] and share of the way from default to level.
 RAMP = np.array([[0.0, 0.0], [60.0, 0.0], [120.0, 1.0], [420.0, 1.0], [480.0, 0.0], [600.0, 0.0]])
 
@@ -29,7 +30,8 @@ def reference_cycle(gearbox: Gearbox, *, step_s: float = 1.0) -> Cycle:
     """The reference cycle of a gearbox: speed and torque scaled to its training bounds, 20 degC, the usual air speed.
 
     Inputs that a definition names go from their defaults to a level and back: one with a range of the definition
-    halfway to the bound that is further away. Without geometry speed and torque go to their typical operation so.
+    halfway to the bound that is further away, with geometry temperatures by 20 K. Without geometry speed and torque go
+    to their typical operation so.
 
     Parameters
     ----------
@@ -63,14 +65,22 @@ def _levels(gearbox: Gearbox) -> dict[str, tuple[float, float]]:
     """Default and level of every input."""
     typical = dict(zip(("speed", "torque"), gearbox.typical_operation, strict=True))
     return {
-        name: (given.default, typical[name] if name in typical else _inside(given))
+        name: (given.default, typical[name] if name in typical else _inside(given, nearby=not gearbox.is_parametric))
         for name, given in gearbox.network().inputs.items()
     }
 
 
-def _inside(given: Input) -> float:
-    """A value well inside the range of an input and away from its default; the default where there is no range."""
+def _inside(given: Input, *, nearby: bool) -> float:
+    """A value inside the range of an input and away from its default; the default where there is no range.
+
+    Parameters
+    ----------
+    nearby : bool
+        True for a temperature that is 20 K warmer at most
+    """
     low, high = given.quantity.low, given.quantity.high
     if given.name in GEARBOX_INPUTS or not np.isfinite(high - low):
         return given.default
+    if nearby and given.quantity.is_temperature:
+        return min(given.default + WARMER, high)
     return 0.5 * (given.default + (high if high - given.default >= given.default - low else low))

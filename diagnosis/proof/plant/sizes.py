@@ -8,10 +8,12 @@ from functools import cached_property
 import numpy as np
 
 from models.assembly.gearbox import Gearbox
+from models.base.errors import InputError
 from models.definition.bearing_section import Bearing
 from models.definition.sections import Shaft
 from models.formulas.geometry import GearPair
 
+ADDED = ("input", "boundary", "part", "link", "heat")  # tables that plants do not know
 T_SERVICE = 60.0  # degC, where the properties of the oil are taken that plants hold constant
 
 
@@ -23,9 +25,22 @@ class BoxSizes:
     ----------
     gearbox : Gearbox
         With geometry; only its first stage counts
+
+    Raises
+    ------
+    InputError
+        If it has parts, heat paths or heats besides its geometry.
     """
 
     gearbox: Gearbox
+
+    def __post_init__(self) -> None:
+        added = [key for key in ADDED if getattr(self.gearbox.geometry, key)]
+        if added:
+            raise InputError(
+                f"{self.gearbox.file}: has [[{']], [['.join(added)}]]; plants are made of teeth, shafts, bearings and "
+                "housing alone: leave these tables out"
+            )
 
     @cached_property
     def pair(self) -> GearPair:
