@@ -6,7 +6,7 @@ Each function returns Markdown; nothing of it is kept in the repository.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from models.assembly.gearbox_definition import Definition
 from models.correction.correction import Correction
 from models.definition.key_texts import TEXTS, KeyText
 from models.definition.known_bearings import known_series
+from models.definition.machine_definition import MachineDefinition
 from models.definition.named_oils import known_oils, lubricant, named_oil, read_oil
 from models.definition.parametric_sections import ParametricDefinition
 from models.definition.values_with_source import Annotations, strip
@@ -99,7 +100,8 @@ class _Quiet(GenerateJsonSchema):
 class _Tables:
     """Reference of one file: a heading and a table of keys for every pydantic model in it."""
 
-    def __init__(self, model: type[BaseModel], example: str | None) -> None:
+    def __init__(self, model: type[BaseModel], example: str | None, *, only: Container[str] | None = None) -> None:
+        self.only = only  # tables at the top of the file
         self.schema = model.model_json_schema(by_alias=True, schema_generator=_Quiet)
         self.definitions: Mapping[str, Schema] = self.schema.get("$defs", {})
         self.values: Mapping[str, Any] = {}
@@ -110,13 +112,14 @@ class _Tables:
 
     def markdown(self) -> Iterator[str]:
         """Yield the lines."""
-        yield from self._section(self.root, "At the top of the file", self.schema, self.values)
+        if self.only is None or "name" in self.only:
+            yield from self._section(self.root, "At the top of the file", self.schema, self.values)
         yield from self._below(self.schema, (), self.values)
 
     def _below(self, schema: Schema, path: tuple[str, ...], values: Any) -> Iterator[str]:
         for key, field in schema["properties"].items():
             name = _table_in(field)
-            if not name:
+            if not name or not (path or self.only is None or key in self.only):
                 continue
             below = values.get(key) if isinstance(values, Mapping) else None
             first = below[0] if isinstance(below, tuple) and below else below
@@ -212,13 +215,24 @@ def _value(value: Any) -> str:
 
 
 def definition() -> Iterator[str]:
-    """Tables and keys of a definition with geometry."""
-    yield from _Tables(Definition, EXAMPLES[Definition]).markdown()
+    """Tables and keys that only a definition with geometry has."""
+    yield from _Tables(Definition, EXAMPLES[Definition], only=_own(Definition)).markdown()
 
 
 def definition_without_geometry() -> Iterator[str]:
-    """Tables and keys of a definition without geometry."""
-    yield from _Tables(ParametricDefinition, EXAMPLES[ParametricDefinition]).markdown()
+    """Tables and keys that only a definition without geometry has."""
+    example = EXAMPLES[ParametricDefinition]
+    yield from _Tables(ParametricDefinition, example, only=_own(ParametricDefinition)).markdown()
+
+
+def definition_of_both() -> Iterator[str]:
+    """Tables and keys that every definition may have."""
+    example = EXAMPLES[ParametricDefinition]
+    yield from _Tables(ParametricDefinition, example, only=MachineDefinition.model_fields).markdown()
+
+
+def _own(model: type[MachineDefinition]) -> set[str]:
+    return model.model_fields.keys() - MachineDefinition.model_fields.keys()
 
 
 def mapping() -> Iterator[str]:
@@ -342,6 +356,7 @@ GENERATORS: Mapping[str, Callable[[], Iterator[str]]] = {
     "bearings": bearings,
     "correction": correction,
     "definition": definition,
+    "definition_of_both": definition_of_both,
     "definition_without_geometry": definition_without_geometry,
     "mapping": mapping,
     "mechanisms": mechanisms,

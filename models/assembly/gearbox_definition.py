@@ -215,7 +215,7 @@ def _added_to_geometry(definition: Definition) -> Iterator[str]:
             yield f"input '{given.name}': is an input of every gearbox with geometry; leave it out"
     for boundary in definition.boundary:
         if boundary.input == "T_ambient" and boundary.temperature_degC is not None:
-            yield f"boundary '{boundary.name}'.temperature_degC: T_ambient has its value in [ambient]; leave it out here"
+            yield f"boundary '{boundary.name}'.temperature_degC: T_ambient has its value in [ambient]; leave it out"
     for number, link in enumerate(definition.link, start=1):
         if link.standstill_share < 1.0:
             yield (
