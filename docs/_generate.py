@@ -101,7 +101,7 @@ class _Tables:
     """Reference of one file: a heading and a table of keys for every pydantic model in it."""
 
     def __init__(self, model: type[BaseModel], example: str | None, *, only: Container[str] | None = None) -> None:
-        self.only = only  # tables at the top of the file
+        self.only = only  # keys at the top of the file
         self.schema = model.model_json_schema(by_alias=True, schema_generator=_Quiet)
         self.definitions: Mapping[str, Schema] = self.schema.get("$defs", {})
         self.values: Mapping[str, Any] = {}
@@ -112,14 +112,16 @@ class _Tables:
 
     def markdown(self) -> Iterator[str]:
         """Yield the lines."""
-        if self.only is None or "name" in self.only:
-            yield from self._section(self.root, "At the top of the file", self.schema, self.values)
-        yield from self._below(self.schema, (), self.values)
+        keys = self.schema["properties"]
+        schema = {**self.schema, "properties": {k: v for k, v in keys.items() if self.only is None or k in self.only}}
+        if not all(map(_table_in, schema["properties"].values())):
+            yield from self._section(self.root, "At the top of the file", schema, self.values)
+        yield from self._below(schema, (), self.values)
 
     def _below(self, schema: Schema, path: tuple[str, ...], values: Any) -> Iterator[str]:
         for key, field in schema["properties"].items():
             name = _table_in(field)
-            if not name or not (path or self.only is None or key in self.only):
+            if not name:
                 continue
             below = values.get(key) if isinstance(values, Mapping) else None
             first = below[0] if isinstance(below, tuple) and below else below
@@ -216,23 +218,22 @@ def _value(value: Any) -> str:
 
 def definition() -> Iterator[str]:
     """Tables and keys that only a definition with geometry has."""
-    yield from _Tables(Definition, EXAMPLES[Definition], only=_own(Definition)).markdown()
+    yield from _Tables(Definition, EXAMPLES[Definition], only=_keys(Definition) - _keys(MachineDefinition)).markdown()
 
 
 def definition_without_geometry() -> Iterator[str]:
     """Tables and keys that only a definition without geometry has."""
-    example = EXAMPLES[ParametricDefinition]
-    yield from _Tables(ParametricDefinition, example, only=_own(ParametricDefinition)).markdown()
+    own = _keys(ParametricDefinition) - _keys(MachineDefinition)
+    yield from _Tables(ParametricDefinition, EXAMPLES[ParametricDefinition], only=own).markdown()
 
 
 def definition_of_both() -> Iterator[str]:
     """Tables and keys that every definition may have."""
-    example = EXAMPLES[ParametricDefinition]
-    yield from _Tables(ParametricDefinition, example, only=MachineDefinition.model_fields).markdown()
+    yield from _Tables(ParametricDefinition, EXAMPLES[ParametricDefinition], only=_keys(MachineDefinition)).markdown()
 
 
-def _own(model: type[MachineDefinition]) -> set[str]:
-    return model.model_fields.keys() - MachineDefinition.model_fields.keys()
+def _keys(model: type[MachineDefinition]) -> set[str]:
+    return {field.alias or name for name, field in model.model_fields.items()}
 
 
 def mapping() -> Iterator[str]:
