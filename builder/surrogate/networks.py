@@ -144,6 +144,13 @@ class NetworkSpec:
         return tuple(i.name for i in self.terms[0].inputs)
 
     @property
+    def roles(self) -> tuple[str, ...]:
+        """Of every output the fixed name of its loss, without the number of a stage; else that of its kind."""
+        return tuple(
+            role for term in self.sampled for role in term.kind.components or (term.kind.name,) * len(term.components)
+        )
+
+    @property
     def powers(self) -> Array:
         """Powers of the inputs that losses are divided by before their logarithm is taken, (outputs, inputs)."""
         return np.concatenate([term.kind.powers for term in self.sampled])
@@ -189,8 +196,12 @@ def network_specs(model: LossModel, domain: Training) -> tuple[NetworkSpec, ...]
     learnt: dict[str, list[LossTerm]] = {}
     for terms in model.groups:
         kind = terms[0].kind
-        known = sum(name.startswith(f"{kind.network}s_") for name in learnt)
-        name = f"{kind.network}s_{known + 1}" if kind.alike else kind.network
+        known = [name for name, others in learnt.items() if others[0].kind.network == kind.network]
+        if kind.alike:
+            name = f"{kind.network}s_{len(known) + 1}"
+        else:  # together with what reads the same inputs; meshes of two stages do not
+            together = (name for name in known if learnt[name][0].inputs == terms[0].inputs)
+            name = next(together, f"{kind.network}_{len(known) + 1}" if known else kind.network)
         learnt.setdefault(name, []).extend(terms)
     specs = [_spec(name, tuple(terms), domain) for name, terms in learnt.items()]
     return tuple(sorted(specs, key=lambda spec: -len(spec.inputs)))

@@ -263,14 +263,14 @@ def _train(
     begin = time.perf_counter()
     # Nobody reads the rest: errors are judged on other points. To train on all points would change every network.
     x, _, y, _ = train_test_split(points, losses, test_size=TEST_SHARE, random_state=seed)
-    apart = all(output.removesuffix("_W") in preset.hidden for output in spec.outputs)
+    apart = all(role in preset.hidden for role in spec.roles)
     parts = [[column] for column in range(len(spec.outputs))] if apart else [list(range(len(spec.outputs)))]
     networks = []
     for columns in parts:
         outputs = [spec.outputs[column] for column in columns]
         powers = spec.powers[columns] if preset.transforms else None
         regressor = LevenbergMarquardtRegressor(
-            preset.hidden.get(outputs[0].removesuffix("_W") if apart else spec.kind, OTHER_HIDDEN),
+            preset.hidden.get(spec.roles[columns[0]] if apart else spec.kind, OTHER_HIDDEN),
             max_iter=preset.max_iter,
             starts=preset.starts,
             start_iterations=preset.start_iterations,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +13,7 @@ from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 from models.definition.messages import place_in
 from models.formulas.oil import kinematic_viscosity_d341
+from models.losses.shaft_loads import bearing_loads
 from models.network.laws import symbol
 from models.portable.evaluation import RPM
 from models.simulation.thermal_network import ThermalNetwork
@@ -48,21 +49,36 @@ def understood(gearbox: Gearbox) -> list[Grid]:
         tables.append(_heats(gearbox, network))
     if "oil" in {part.name for part in network.parts}:
         tables.append(_oil(gearbox))
-    return tables if gearbox.is_parametric else [*tables, _gears(gearbox)]
+    return tables if gearbox.is_parametric else [*tables, _bearing_loads(gearbox), *_gears(gearbox)]
 
 
-def _gears(gearbox: Gearbox) -> Grid:
-    stage, level = gearbox.stage[0], gearbox.oil.level_below_axis
-    pair, (_, torque, _) = stage.pair(), gearbox.definition.full_operation
+def _gears(gearbox: Gearbox) -> Iterator[Grid]:
+    geometry = gearbox.geometry
+    _, torque, _ = geometry.full_operation
+    for number, stage in enumerate(gearbox.stage, start=1):
+        pair, levels = stage.pair(), [geometry.level_below_axis[shaft] for shaft in (stage.driver, stage.driven)]
+        rows = [
+            [name, f"{2e3 * r_a:.1f}", f"{1e3 * (r_a - level):.1f}" if r_a > level else "not at all"]
+            for name, r_a, level in zip(stage.names, pair.r_a, levels, strict=True)
+        ]
+        of_stage = f" of stage {number}" if len(gearbox.stage) > 1 else ""
+        level = " and ".join(dict.fromkeys(f"{1e3 * level:g}" for level in levels))
+        title = f"Gears{of_stage}; contact ratio {pair.epsilon_alpha:.3f}; oil {level} mm below their axes"
+        if pair.epsilon_beta > 0.0:
+            push = torque * geometry.torque_ratio[stage.driver] / pair.r_b[0] * math.tan(pair.beta_b)
+            title += f"\n(overlap ratio {pair.epsilon_beta:.3f}; {push:.4g} N along the shafts at {torque:g} N m)"
+        yield Grid(title, ["gear", "tip diameter, mm", "dips, mm"], rows)
+
+
+def _bearing_loads(gearbox: Gearbox) -> Grid:
+    (speed, torque, _), loads = gearbox.geometry.full_operation, bearing_loads(gearbox.geometry)
     rows = [
-        [name, f"{2e3 * r_a:.1f}", f"{1e3 * (r_a - level):.1f}" if r_a > level else "not at all"]
-        for name, r_a in zip(stage.names, pair.r_a, strict=True)
-    ]
-    title = f"Gears; contact ratio {pair.epsilon_alpha:.3f}; oil {1e3 * level:g} mm below their axes"
-    if pair.epsilon_beta > 0.0:
-        push = torque / pair.r_b[0] * math.tan(pair.beta_b)
-        title += f"\n(overlap ratio {pair.epsilon_beta:.3f}; {push:.4g} N along the shafts at {torque:g} N m)"
-    return Grid(title, ["gear", "tip diameter, mm", "dips, mm"], rows)
+        [bearing.name, f"{speed * gearbox.speed_ratio[bearing.shaft]:.4g}", f"{torque * load.radial:.4g}",
+         f"{torque * load.radial * load.axial_share:.4g}"]
+        for bearing in gearbox.bearing for load in [loads[bearing.name]]
+    ]  # fmt: skip
+    title = f"Bearings at {speed:g} 1/min and {torque:g} N m of the input shaft"
+    return Grid(title, ["bearing", "speed, 1/min", "radial load, N", "axial load, N"], rows)
 
 
 def conductances(gearbox: Gearbox, network: ThermalNetwork) -> dict[str, float]:

@@ -126,7 +126,7 @@ class Gearbox:
 
     @property
     def stage(self) -> tuple[Stage, ...]:
-        """``[[stage]]``; exactly one for now."""
+        """``[[stage]]``, from the input shaft on."""
         return self.geometry.stage
 
     @property

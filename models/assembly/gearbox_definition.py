@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, Self
+from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
@@ -27,6 +27,7 @@ from models.definition.sections import (
 )
 from models.formulas.oil import Oil as Lubricant
 from models.losses.loss_model import loss_components, loss_factors
+from models.losses.loss_term import MESH, OIL, of_stages
 from models.quantities.definition_units import between
 from models.quantities.quantities import Input, usual_inputs
 
@@ -89,7 +90,7 @@ class Definition(MachineDefinition):
     @property
     def own_parts(self) -> tuple[str, ...]:
         """Parts that follow from the geometry."""
-        return (*_part_names(self), "oil", "mesh")
+        return (*_part_names(self), OIL, *self.mesh_names)
 
     @property
     def own_boundaries(self) -> tuple[str, ...]:
@@ -103,8 +104,12 @@ class Definition(MachineDefinition):
 
     @property
     def own_losses(self) -> tuple[str, ...]:
-        """Names of losses: the fixed ones, bearings and seals."""
-        return (*loss_components(), *(bearing.name for bearing in self.bearing), *(seal.name for seal in self.seal))
+        """Names of losses: the fixed ones of every stage, bearings and seals."""
+        return (
+            *_numbered_losses(self),
+            *(bearing.name for bearing in self.bearing),
+            *(seal.name for seal in self.seal),
+        )
 
     @property
     def all_factors(self) -> Mapping[str, float]:
@@ -119,34 +124,42 @@ class Definition(MachineDefinition):
     @property
     def speed_ratio(self) -> Mapping[str, float]:
         """Speed of every shaft over the speed of the input shaft, by shaft name, [-]."""
-        stage = self.stage[0]
-        return {stage.driver: 1.0, stage.driven: stage.z[0] / stage.z[1]}
+        ratio = {self.stage[0].driver: 1.0}
+        for stage in self.stage:
+            ratio[stage.driven] = ratio[stage.driver] * (stage.z[0] / stage.z[1])
+        return ratio
+
+    @property
+    def torque_ratio(self) -> Mapping[str, float]:
+        """Torque of every shaft without losses over the torque of the input shaft, by shaft name, [-]."""
+        ratio = {self.stage[0].driver: 1.0}
+        for stage in self.stage:
+            ratio[stage.driven] = ratio[stage.driver] * (stage.z[1] / stage.z[0])
+        return ratio
+
+    @property
+    def level_below_axis(self) -> Mapping[str, float]:
+        """Oil level below the axis of every shaft, by shaft name, [m]."""
+        return {shaft.name: self.oil.level_below_axis + shaft.axis_height for shaft in self.shaft}
+
+    @property
+    def mesh_names(self) -> tuple[str, ...]:
+        """Thermal nodes of the meshes, in the order of the stages."""
+        return of_stages(MESH, len(self.stage))
 
     def lubricant(self) -> Lubricant:
         """Return the oil as the loss formulas use it."""
         return lubricant(self.oil)
 
-    @model_validator(mode="before")
-    @classmethod
-    def _is_of_one_stage(cls, values: Any) -> Any:
-        """Before keys of a second stage are asked for."""
-        for key, most in (("stage", 1), ("shaft", 2)):
-            entries = values.get(key) if isinstance(values, Mapping) else None
-            if isinstance(entries, list | tuple) and len(entries) > most:
-                raise ValueError(
-                    f"{key}: has {len(entries)} entries; more than {most} is not supported yet. "
-                    "Describe such a machine without geometry: python -m builder new FILE --like reducer"
-                )
-        return values
-
     @model_validator(mode="after")
     def _tables_agree(self) -> Self:
+        # What follows reads the tables by their names, and then the shafts along the stages.
         faults = [*_duplicate_names(self), *_unknown_names(self), *name_faults(self), *_names_of_the_model(self)]
-        # What follows reads the tables by their names.
+        faults = faults or [*_chain(self)]
         faults = faults or [
             *_load_shares(self), *_taper_pairs(self), *_axial_loads(self), *_shafts_in_gears(self),
-            *_seals_on_shafts(self), *_gears_in_housing(self), *_oil_level(self), *_oil_volume(self),
-            *input_faults(self), *link_faults(self), *_added_to_geometry(self),
+            *_axis_heights(self), *_seals_on_shafts(self), *_gears_in_housing(self), *_oil_level(self),
+            *_oil_volume(self), *input_faults(self), *link_faults(self), *_added_to_geometry(self),
         ]  # fmt: skip
         if faults:
             raise ValueError("\n".join(faults))
@@ -168,11 +181,16 @@ def _duplicate_names(definition: Definition) -> Iterator[str]:
     for name, count in Counter(names).items():
         if count > 1:
             yield f"name '{name}' is given {count} times; every part and component needs its own"
-        if name in RESERVED:
+        if name in (*RESERVED, *definition.mesh_names, *_numbered_losses(definition)):
             yield f"name '{name}' is taken by the model itself; choose another"
     for name, count in Counter(node.name for node in definition.node).items():
         if count > 1:
             yield f"node: '{name}' is overridden {count} times"
+
+
+def _numbered_losses(definition: Definition) -> Iterator[str]:
+    for component in loss_components():
+        yield from of_stages(component, len(definition.stage))
 
 
 def _unknown_names(definition: Definition) -> Iterator[str]:
@@ -200,7 +218,7 @@ def _names_of_the_model(definition: Definition) -> Iterator[str]:
     added = [*(part.name for part in definition.part), *(boundary.name for boundary in definition.boundary)]
     nodes = (*definition.own_parts, *definition.own_boundaries)  # reported as given twice
     for name in added:
-        if name in (*RESERVED, "housing") and name not in nodes:
+        if name in (*RESERVED, *_numbered_losses(definition), "housing") and name not in nodes:
             yield f"name '{name}' is taken by the model itself; choose another"
     for heat in definition.heat:
         for name in (heat.name, *(f"{heat.name}_{part}" for part in heat.parts)):
@@ -224,14 +242,50 @@ def _added_to_geometry(definition: Definition) -> Iterator[str]:
             )
 
 
+def _chain(definition: Definition) -> Iterator[str]:
+    """Refuse stages that do not follow each other from the input shaft to the output shaft."""
+    turning = [definition.stage[0].driver]
+    for number, stage in enumerate(definition.stage, start=1):
+        if stage.driver != turning[-1]:
+            yield (
+                f"stage #{number}.driver: is '{stage.driver}', but the stage before drives '{turning[-1]}'; list the "
+                "stages from the input shaft on. Branches are not supported: describe such a machine without geometry "
+                "(python -m builder new FILE --like reducer)"
+            )
+        if stage.driven in turning:
+            yield f"stage #{number}.driven: '{stage.driven}' is driven or drives already; name the next shaft"
+        turning.append(stage.driven)
+    if definition.stage[0].angle_deg is not None:
+        yield "stage #1.angle_deg: there is no stage before it; leave it out"
+    for shaft in definition.shaft:
+        if shaft.name not in turning:
+            yield f"shaft '{shaft.name}': no stage has it as driver or driven; leave it out"
+
+
 def _load_shares(definition: Definition) -> Iterator[str]:
     """Refuse bearings that carry more or less than the mesh force of their shaft."""
     for shaft in definition.shaft:
-        shares = [bearing.load_share for bearing in definition.bearing if bearing.shaft == shaft.name]
-        if not shares:
+        bearings = [bearing for bearing in definition.bearing if bearing.shaft == shaft.name]
+        shares = [bearing.load_share for bearing in bearings if bearing.load_share is not None]
+        if not bearings:
             yield f"bearing: none is on the shaft '{shaft.name}'"
+        elif len(shares) < len(bearings):
+            yield from _positions(definition, shaft.name, bearings)
         elif abs(sum(shares) - 1.0) > SHARE_TOLERANCE:
             yield f"bearing: load_share of the bearings on '{shaft.name}' sum to {sum(shares):g}, not to 1"
+
+
+def _positions(definition: Definition, shaft: str, bearings: list[Bearing]) -> Iterator[str]:
+    """Refuse a shaft that is no beam on two supports of known places."""
+    places = {bearing.position_mm for bearing in bearings if bearing.position_mm is not None}
+    if len(places) != 2 or len(bearings) != 2:
+        yield (
+            f"bearing: those on '{shaft}' need position_mm at two different places, one each; with more bearings, or "
+            "one, give each a load_share"
+        )
+    for number, stage in enumerate(definition.stage, start=1):
+        if shaft in (stage.driver, stage.driven) and stage.position_mm is None:
+            yield f"stage #{number}.position_mm is missing; the bearings of '{shaft}' have position_mm"
 
 
 def _taper_pairs(definition: Definition) -> Iterator[str]:
@@ -246,8 +300,10 @@ def _taper_pairs(definition: Definition) -> Iterator[str]:
 
 def _axial_loads(definition: Definition) -> Iterator[str]:
     """Refuse shafts of helical gears whose axial force no bearing can take, or several would."""
-    angle = definition.stage[0].helix_angle_deg
-    for shaft in definition.shaft if angle > 0.0 else ():
+    for shaft in definition.shaft:
+        angle = max(s.helix_angle_deg for s in definition.stage if shaft.name in (s.driver, s.driven))
+        if angle == 0.0:
+            continue
         locating = [bearing for bearing in definition.bearing if bearing.shaft == shaft.name and bearing.locating]
         if len(locating) != 1:
             yield (
@@ -271,6 +327,20 @@ def _shafts_in_gears(definition: Definition) -> Iterator[str]:
                 )
 
 
+def _axis_heights(definition: Definition) -> Iterator[str]:
+    """Refuse axes that are further apart in height than their centre distance."""
+    height = {shaft.name: 1e3 * shaft.axis_height for shaft in definition.shaft}
+    if height[definition.stage[0].driver] != 0.0:
+        yield f"shaft '{definition.stage[0].driver}'.axis_height_mm: heights are those above this shaft; leave it out"
+    for number, stage in enumerate(definition.stage, start=1):
+        apart = abs(height[stage.driver] - height[stage.driven])
+        if apart > stage.center_distance_mm:
+            yield (
+                f"stage #{number}: axis_height_mm of its shafts differ by {apart:g}, more than its "
+                f"center_distance_mm of {stage.center_distance_mm:g}"
+            )
+
+
 def _seals_on_shafts(definition: Definition) -> Iterator[str]:
     """Refuse seals that no station of their shaft can have."""
     diameters = {shaft.name: shaft.diameter_mm for shaft in definition.shaft}
@@ -286,7 +356,7 @@ def _seals_on_shafts(definition: Definition) -> Iterator[str]:
 def _gears_in_housing(definition: Definition) -> Iterator[str]:
     """Refuse a housing that is lower than its largest gear."""
     height = definition.housing.height_m
-    largest = 2.0 * max(definition.stage[0].pair().r_a)
+    largest = 2.0 * max(radius for stage in definition.stage for radius in stage.pair().r_a)
     if height < largest:
         yield (
             f"housing.height_m: {height:g} m is less than the tip diameter of the largest gear, {largest:.4g} m: "

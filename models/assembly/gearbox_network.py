@@ -1,6 +1,6 @@
 """From a gearbox definition to its thermal network: which nodes there are, what links them, where the losses go.
 
-Boundaries: air and frame (ambient temperature). Parts, in order: housing parts, oil, bearings, shafts, gears, mesh.
+Boundaries: air and frame (ambient temperature). Parts, in order: housing parts, oil, bearings, shafts, gears, meshes.
 The structure is the 14-element network of Durand de Gevigney et al. that the paper follows (section 5, fig. 9); the
 laws are those of :mod:`models.formulas.heat_transfer`, with the numbers of the definition and the tunable factors as
 parameters.
@@ -9,6 +9,7 @@ parameters.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 import sympy as sp
@@ -16,10 +17,11 @@ import sympy as sp
 from models.assembly.gearbox_definition import Definition
 from models.assembly.table_builder import with_tables
 from models.definition.bearing_section import Bearing
-from models.definition.sections import Shaft
+from models.definition.sections import Shaft, Stage
 from models.formulas import heat_transfer as ht
 from models.formulas.ehl import reduced_modulus
 from models.formulas.extremes import Max, Min
+from models.formulas.geometry import GearPair
 from models.formulas.oil import (
     T_HIGHEST,
     T_LOWEST,
@@ -93,12 +95,10 @@ class _Builder:
 
     def __init__(self, gearbox: Definition, priors: Mapping[str, float]) -> None:
         self.gearbox, self.priors = gearbox, priors
-        self.stage = gearbox.stage[0]
-        self.pair = self.stage.pair()
+        self.gears = tuple(_gears(gearbox))
         self.losses = LossModel.from_definition(gearbox)
         self.overrides = {node.name: node.heat_capacity_J_K for node in gearbox.node}
         self.housing_parts = tuple(part.name for part in gearbox.housing.part)
-        self.shaft_of_gear = {self.stage.names[0]: self.stage.driver, self.stage.names[1]: self.stage.driven}
         self.speed = sp.Abs(symbol("speed"))
 
     def network(self) -> ThermalNetwork:
@@ -114,8 +114,9 @@ class _Builder:
                 "housing": self.housing_parts,
                 "bearings": tuple(bearing.name for bearing in gearbox.bearing),
                 "shafts": tuple(shaft.name for shaft in gearbox.shaft),
-                "gears": self.stage.names,
-            },
+                "gears": tuple(gear.name for gear in self.gears),
+            }
+            | ({MESH: gearbox.mesh_names} if len(gearbox.stage) > 1 else {}),
         )
 
     # ------------------------------------------------------------------ parameters, nodes, sources
@@ -144,7 +145,7 @@ class _Builder:
             yield self._part(part.name, wall_capacity * part.area_fraction, f"C_{part.name}")
         filling = self.gearbox.oil.volume * float(oil.density(T_SERVICE) * oil.specific_heat(T_SERVICE))
         yield self._part(OIL, filling, "C_oil")
-        steel = self.stage.material
+        steel = self.gearbox.stage[0].material
         for bearing in self.gearbox.bearing:
             yield self._part(bearing.name, bearing.mass_kg * steel.specific_heat_J_kgK, "C_bearings")
         per_volume = steel.density_kg_m3 * steel.specific_heat_J_kgK
@@ -152,10 +153,11 @@ class _Builder:
             own = shaft.heat_capacity_J_K
             cylinder = per_volume * np.pi / 4.0 * shaft.diameter**2 * shaft.length
             yield self._part(shaft.name, cylinder if own is None else own, "C_shafts")
-        for index, gear in enumerate(self.stage.names):
-            ring = np.pi * (self.pair.r[index] ** 2 - self._shaft_radius(gear) ** 2) * self.pair.b
-            yield self._part(gear, per_volume * ring, "C_gears")
-        yield self._part(MESH, MESH_CAPACITY, None)
+        for gear in self.gears:
+            ring = np.pi * (gear.r**2 - self._shaft_radius(gear) ** 2) * gear.pair.b
+            yield self._part(gear.name, gear.heat_per_volume * ring, "C_gears")
+        for mesh in self.gearbox.mesh_names:
+            yield self._part(mesh, MESH_CAPACITY, None)
 
     def _part(self, name: str, capacity: float, factor: str | None) -> Node:
         value = sp.Float(self.overrides.get(name, capacity))
@@ -213,45 +215,47 @@ class _Builder:
         return ht.convection_churchill_chu(T=T, T_a=T_a, length=length)
 
     def _gear_links(self) -> Iterator[Link]:
-        for index, gear in enumerate(self.stage.names):
-            yield self._link(gear, OIL, symbol("h_oil_gear") * self._gear_to_oil(index))
-        b, k = self.pair.b, self.stage.material.conductivity_W_mK
-        for index, gear in enumerate(self.stage.names):
-            ring = 2.0 * np.pi * k * b / np.log(self.pair.r[index] / self._shaft_radius(gear))
-            yield self._link(gear, self.shaft_of_gear[gear], symbol("gear_shaft") * ring)
-        for gear in self.stage.names:
-            yield self._link(MESH, gear, symbol("striction") * self._striction())
+        for gear in self.gears:
+            yield self._link(gear.name, OIL, symbol("h_oil_gear") * self._gear_to_oil(gear))
+        for gear in self.gears:
+            k = gear.stage.material.conductivity_W_mK
+            ring = 2.0 * np.pi * k * gear.pair.b / np.log(gear.r / self._shaft_radius(gear))
+            yield self._link(gear.name, gear.shaft, symbol("gear_shaft") * ring)
+        for mesh, stage in zip(self.gearbox.mesh_names, self.gearbox.stage, strict=True):
+            for name in stage.names:
+                yield self._link(mesh, name, symbol("striction") * self._striction(stage))
 
-    def _gear_to_oil(self, index: int) -> sp.Expr:
+    def _gear_to_oil(self, gear: _Gear) -> sp.Expr:
         """Immersed faces as a rotating disk, teeth by fling-off; oil properties at sump temperature.
 
         The immersed fraction is the tip circle's, the area the reference circle's: half of the ring outside it is gap.
         The tip circle's area gives 11.5 and 18.1 in place of 10.4 and 16.3 W/K (FZG, 8.3 m/s, 77.7 degC); metal alone
         gives 10.0 and 16.0.
         """
-        oil, pair = self.gearbox.lubricant(), self.pair
+        oil, pair, index = self.gearbox.lubricant(), gear.pair, gear.index
         T = Min(Max(symbol(f"T_{OIL}"), T_LOWEST), T_HIGHEST)  # as the losses do
         nu = kinematic_viscosity_d341(T, oil.m, oil.n, xp=sp) * 1e-6
         rho = density_linear(T, oil.rho_ref, oil.T_ref, oil.expansion)
         c = specific_heat_cragoe(T, oil.rho_15) if oil.specific_heat_constant is None else oil.specific_heat_constant
         k = conductivity_cragoe(T, oil.rho_15) if oil.conductivity_constant is None else oil.conductivity_constant
         prandtl = nu * rho * c / k
-        omega = self.speed * RPM * (1.0 if index == 0 else 1.0 / pair.u)
-        r_a, r, height = pair.r_a[index], pair.r[index], pair.r_a[index] - pair.r_f[index]
-        theta = np.arccos(np.clip(self.gearbox.oil.level_below_axis / r_a, -1.0, 1.0))
+        omega = self.speed * RPM * (self.gearbox.speed_ratio[gear.stage.driver] / (1.0 if index == 0 else pair.u))
+        r_a, r, height = pair.r_a[index], gear.r, pair.r_a[index] - pair.r_f[index]
+        theta = np.arccos(np.clip(self.gearbox.level_below_axis[gear.shaft] / r_a, -1.0, 1.0))
         immersed = (2.0 * theta - np.sin(2.0 * theta)) / (2.0 * np.pi)
         disk = ht.rotating_disk(omega=omega, radius=r, nu=nu, k=k, prandtl=prandtl)
         teeth = ht.fling_off(omega=omega, radius=r, tooth_height=height, rho=rho, c=c, k=k, prandtl=prandtl)
         # Half of the flanks is taken to carry oil; a gear that does not reach the sump is wetted through the mesh.
         return disk * 2.0 * np.pi * r**2 * immersed + teeth * pair.z[index] * height * pair.b
 
-    def _striction(self) -> sp.Expr:
+    def _striction(self, stage: Stage) -> sp.Expr:
         """Inverse of the mean rise under a fast band source at the pitch point, the law of the flash temperature."""
-        steel, pair = self.stage.material, self.pair
+        steel, pair = stage.material, stage.pair()
         torque = Max(sp.Abs(symbol("torque")), TORQUE_FLOOR_NM)
-        omega = Max(self.speed, SPEED_FLOOR_RPM) * RPM
+        arm = pair.r_b[0] / self.gearbox.torque_ratio[stage.driver]  # tooth force = torque of the input shaft / arm
+        omega = Max(self.speed, SPEED_FLOOR_RPM) * (RPM * self.gearbox.speed_ratio[stage.driver])
         E_red = reduced_modulus(steel.youngs_modulus, steel.poisson, steel.youngs_modulus, steel.poisson)
-        b_H = sp.sqrt(8.0 * torque / (pair.r_b[0] * pair.b) * pair.rho_red_C / (np.pi * E_red))
+        b_H = sp.sqrt(8.0 * torque / (arm * pair.b) * pair.rho_red_C / (np.pi * E_red))
         line, across = pair.b / np.cos(pair.beta_b), pair.T1C * np.cos(pair.beta_b)
         k, chi = steel.conductivity_W_mK, steel.conductivity_W_mK / (steel.density_kg_m3 * steel.specific_heat_J_kgK)
         return 2.0 * b_H * line * k / 1.06 * sp.sqrt(omega * across / (chi * b_H))
@@ -286,10 +290,38 @@ class _Builder:
 
     def _ring(self, bearing: Bearing) -> float:
         """Radial resistance of a bearing taken as a solid steel ring, [K/W]."""
-        k = self.stage.material.conductivity_W_mK
+        k = self.gearbox.stage[0].material.conductivity_W_mK
         ratio = bearing.outside_diameter_mm / bearing.bore_mm
         return float(np.log(ratio) / (2.0 * np.pi * k * bearing.width_mm * 1e-3))
 
-    def _shaft_radius(self, gear: str) -> float:
-        shaft = next(s for s in self.gearbox.shaft if s.name == self.shaft_of_gear[gear])
+    def _shaft_radius(self, gear: _Gear) -> float:
+        shaft = next(s for s in self.gearbox.shaft if s.name == gear.shaft)
         return 0.5 * shaft.diameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Gear:
+    """One gear of a stage; `index` is 0 of the driver's, 1 of the other one."""
+
+    name: str
+    shaft: str
+    stage: Stage
+    pair: GearPair
+    index: int
+
+    @property
+    def r(self) -> float:
+        """Reference radius, [m]."""
+        return self.pair.r[self.index]
+
+    @property
+    def heat_per_volume(self) -> float:
+        """Heat capacity of its steel, [J/(m3 K)]."""
+        return self.stage.material.density_kg_m3 * self.stage.material.specific_heat_J_kgK
+
+
+def _gears(gearbox: Definition) -> Iterator[_Gear]:
+    for stage in gearbox.stage:
+        pair = stage.pair()
+        for index, (name, shaft) in enumerate(zip(stage.names, (stage.driver, stage.driven), strict=True)):
+            yield _Gear(name=name, shaft=shaft, stage=stage, pair=pair, index=index)

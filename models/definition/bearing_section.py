@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from models.definition.sections import Coefficient, Name, Section, Text
+from models.definition.sections import Coefficient, Name, Position, Section, Text
 from models.quantities.definition_units import between
 
 STEEL = 7850e-9  # kg/mm3
@@ -49,7 +49,8 @@ class Bearing(Section):
     mu_EHL: Annotated[Coefficient, Field(default=None)]
     oil_level_mm: Annotated[float, between(0.0, 1000.0)] | None = None
     temperature: Literal["mean", "skf_outlet"] = "mean"
-    load_share: Annotated[float, between(0.0, 1.0)]
+    load_share: Annotated[float, between(0.0, 1.0)] | None = None
+    position_mm: Position | None = None
     locating: bool | None = None  # none, not false, so that files without helical gears keep their hash
     static_load_kN: Annotated[float, between(0.1, 1e4)] | None = None
     Y: Annotated[float, between(0.3, 5.0)] | None = None
@@ -87,7 +88,7 @@ class Bearing(Section):
         if self.type == "deep_groove_ball" and (self.S2 is None or self.static_load_kN is None):
             return "S2 of its series (SKF) and static_load_kN, the rating C0 of the catalogue, are needed"
         return (
-            None if self.load_share > 0.0 else "its load_share is 0, and a locating bearing carries a radial load too"
+            "its load_share is 0, and a locating bearing carries a radial load too" if self.load_share == 0.0 else None
         )
 
     @property
@@ -111,6 +112,12 @@ class Bearing(Section):
             raise ValueError(
                 "a tapered_roller bearing needs Y, its axial load factor (catalogue), and a load_share above 0"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _has_one_place(self) -> Self:
+        if (self.load_share is None) == (self.position_mm is None):
+            raise ValueError("needs either load_share or position_mm, and not both")
         return self
 
     @model_validator(mode="after")

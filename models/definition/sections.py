@@ -46,6 +46,7 @@ HeatCapacity = Annotated[float, between(0.01, 1e8)]
 FluidTemperature = Annotated[float, between(-60.0, 250.0, unit="_degC")]
 Viscosity = Annotated[float, between(0.5, 1e5, unit="_mm2_s")]
 Coefficient = Annotated[float, between(1e-4, 0.5)]
+Position = Annotated[float, between(-5000.0, 5000.0)]  # along a shaft, mm
 
 
 class Section(BaseModel):
@@ -196,9 +197,15 @@ class Shaft(Section):
     heat_capacity_J_K: HeatCapacity | None = None
     surface_to_air: bool = False
     length_in_air_mm: Annotated[float, between(0.1, 5000.0)] | None = None
+    axis_height_mm: Annotated[float, between(-2000.0, 2000.0)] | None = None
 
     length = in_si("length_mm")
     diameter = in_si("diameter_mm")
+
+    @property
+    def axis_height(self) -> float:
+        """Height of its axis above that of the input shaft, [m]; 0 where none is given."""
+        return 1e-3 * (self.axis_height_mm or 0.0)
 
     @property
     def length_in_air(self) -> float:
@@ -242,6 +249,7 @@ class Friction(Section):
     film: Literal["hamrock_dowson", "dowson_toyoda", "grubin"] = "hamrock_dowson"
     thermal_reduction: Literal["gupta", "gupta_simple", "murch_wilson"] = "gupta"
     average: Literal["base_pitch", "path_of_contact"] = "base_pitch"
+    load_floor: bool | None = None
 
 
 class Rolling(Section):
@@ -277,9 +285,11 @@ class Stage(Section):
     tip_shortening: bool = True
     tip_diameter_mm: tuple[Annotated[float, between(2.0, 5000.0)], Annotated[float, between(2.0, 5000.0)]] | None = None
     bore_mm: tuple[Annotated[float, between(1.0, 2000.0)], Annotated[float, between(1.0, 2000.0)]]
+    position_mm: tuple[Position, Position] | None = None
+    angle_deg: Annotated[float, between(-180.0, 180.0)] | None = None
     roughness_Ra_um: tuple[Annotated[float, between(0.01, 20.0)], Annotated[float, between(0.01, 20.0)]]
     material: Material = Material()
-    load_sharing: Literal["potential_energy", "sanchez_pedrero", "equal"]
+    load_sharing: Literal["potential_energy", "sanchez_pedrero", "equal", "ohlendorf"]
     friction: Friction
     rolling: Rolling
     churning: Churning

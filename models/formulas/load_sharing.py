@@ -21,7 +21,7 @@ from models.base.types import Array, Numeric
 from models.formulas.geometry import GearPair
 from models.formulas.mesh_stiffness import tooth_pair_stiffness
 
-LoadSharing = Literal["potential_energy", "sanchez_pedrero", "equal"]
+LoadSharing = Literal["potential_energy", "sanchez_pedrero", "equal", "ohlendorf"]
 _ROUNDING = 1e-9  # in base pitches: a pair this close outside A ... E still counts as touching there
 # Gauss points of helical gears between two kinks, along the path of contact and over the face: the loss factor is
 # within 0.1 % of that with 6 x 6, for helix angles from 0.01 to 30 degrees; sliding losses were within 0.4 %.
@@ -65,7 +65,7 @@ def load_share(
 
     with the weight w of the model: the stiffness of :func:`models.formulas.mesh_stiffness.tooth_pair_stiffness`
     ("potential_energy"), the closed form of :func:`unit_stiffness_sanchez_pedrero` ("sanchez_pedrero"), or 1
-    ("equal", rigid teeth).
+    ("equal" and "ohlendorf", rigid teeth).
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def load_share(
         The gears
     t : Numeric, shape (...)
         Coordinate on the line of action, [m]
-    model : {"potential_energy", "sanchez_pedrero", "equal"}
+    model : {"potential_energy", "sanchez_pedrero", "equal", "ohlendorf"}
         Which weight
     r_bore, E, nu : tuple of float
         Bore radii [m], Young's moduli [Pa] and Poisson's ratios [-] of the two gears; read by "potential_energy" only
@@ -201,6 +201,7 @@ def contact_points(
               \sum_j \int_{\varphi + j - \varepsilon_\beta}^{\varphi + j} \kappa(\xi')\,d\xi'
 
     with the weight :math:`\kappa` of the model, 0 outside A ... E ("equal": uniform load on the lines of contact).
+    "ohlendorf" takes the shares of a spur pair for helical gears too, as ISO/TR 14179-2 and WTplus do.
 
     Parameters
     ----------
@@ -231,7 +232,7 @@ def contact_points(
     >>> round(load_sharing_loss_factor(pair, points), 4)
     0.1915
     """
-    if pair.epsilon_beta > 0.0:
+    if pair.epsilon_beta > 0.0 and model != "ohlendorf":
         return _points_on_lines(pair, _weight_of(pair, model, r_bore, E, nu))
     t, dx = _gauss_points(contact_breakpoints(pair), n)
     return ContactPoints(t=t, dx=dx, share=load_share(pair, t, model=model, r_bore=r_bore, E=E, nu=nu))

@@ -5,7 +5,7 @@ The catalogue's units are kept inside: mm, N, 1/min, mm^2/s, N mm.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -13,10 +13,10 @@ import numpy as np
 
 from models.base.root_finding import decreasing_root
 from models.base.types import Array, Numeric
-from models.definition.bearing_section import Bearing
 from models.formulas.heat_transfer import GRAVITY
 from models.formulas.oil import Oil
 from models.losses.loss_term import OIL, SPEED, TORQUE, GearboxData, LossKind, LossTerm, TermInput
+from models.losses.shaft_loads import bearing_loads
 from models.portable.evaluation import RPM
 
 # SKF's drag factor over H/d_m: read off the catalogue's diagram (digitised by the public re-implementation
@@ -287,35 +287,16 @@ class BearingLaw:
         return loss[:, None]
 
 
-def _axial_share(table: Bearing, bearings: Sequence[Bearing], tilt: float) -> float:
-    r"""Axial load of a bearing over the transverse tooth force, [-].
-
-    Under a radial load a taper bearing pushes its partner with :math:`F_r / 2Y`. Of a pair without preload each carries
-    its own push, or that of the other one with what the gear adds to it or takes from it, whichever is more.
-
-    References
-    ----------
-    SKF "Rolling bearings", 2016, section on taper roller bearings; from memory, its six cases in one formula.
-    """
-    push = tilt if table.locating else 0.0
-    if table.type != "tapered_roller":
-        return push
-    other = next(b for b in bearings if b.shaft == table.shaft and b.type == table.type and b.name != table.name)
-    own, from_other = (0.5 * one.load_share / float(one.Y or 1.0) for one in (table, other))
-    return max(own, from_other + push - (tilt if other.locating else 0.0))
-
-
 def bearing_terms(gearbox: GearboxData) -> Iterator[LossTerm]:
-    """Yield the loss of every ``[[bearing]]``: its share of the transverse tooth force is its radial load.
+    """Yield the loss of every ``[[bearing]]``.
 
-    The locating bearing of a shaft takes the whole axial force of helical gears, ``F_bt tan(beta_b)``; two taper
-    bearings share it with what they push each other. The couple that this force makes at the pitch circle loads one
-    bearing more and the other less; it is left out.
+    Its radial load is that of :func:`models.losses.shaft_loads.bearing_loads`. The locating bearing of a shaft takes
+    the whole axial force of helical gears, ``F_bt tan(beta_b)``; two taper bearings share it with what they push each
+    other.
     """
-    oil, pair = gearbox.lubricant(), gearbox.stage[0].pair()
-    r_b, tilt = pair.r_b[0], float(np.tan(pair.beta_b))
-    level_mm = gearbox.oil.level_below_axis * 1e3
+    oil, loads = gearbox.lubricant(), bearing_loads(gearbox)
     for table in gearbox.bearing:
+        load = loads[table.name]
         d, D, B = table.bore_mm, table.outside_diameter_mm, table.width_mm
         W_s = table.heat_dissipation_W_K
         S_axial, C_0 = table.axial_constants
@@ -324,11 +305,11 @@ def bearing_terms(gearbox: GearboxData) -> Iterator[LossTerm]:
             d=d,
             D=D,
             B=B,
-            H=table.oil_level(level_mm),
+            H=table.oil_level(gearbox.level_below_axis[table.shaft] * 1e3),
             mass=table.mass_kg,
             R1=table.R1,
             S=table.sliding_constant,
-            axial=_axial_share(table, gearbox.bearing, tilt) / (table.load_share or 1.0),
+            axial=load.axial_share,
             S_axial=S_axial,
             C_0=C_0,
             Y=table.Y or 0.0,
@@ -344,7 +325,7 @@ def bearing_terms(gearbox: GearboxData) -> Iterator[LossTerm]:
         )
         inputs = (
             TermInput("speed_rpm", SPEED, gearbox.speed_ratio[table.shaft]),
-            TermInput("radial_load_N", TORQUE, table.load_share / r_b, lowest=bearing.lightest_load),
+            TermInput("radial_load_N", TORQUE, load.radial, lowest=bearing.lightest_load),
             TermInput("T_oil_degC", OIL),
             TermInput("T_bearing_degC", table.name),
         )

@@ -12,7 +12,7 @@ from models.base.types import Array, Numeric
 from models.formulas.geometry import GearPair
 from models.formulas.heat_transfer import GRAVITY
 from models.formulas.oil import Oil
-from models.losses.loss_term import OIL, SPEED, GearboxData, LossKind, LossTerm, TermInput
+from models.losses.loss_term import OIL, SPEED, GearboxData, LossKind, LossTerm, TermInput, of_stages
 from models.portable.evaluation import RPM
 
 RE_LAMINAR, RE_TURBULENT = 6000.0, 9000.0  # of 2007
@@ -213,26 +213,30 @@ def _regimes(h: float, r_p: float, b: float, V_oil: float, omega: Array) -> tupl
 
 @dataclass(frozen=True, kw_only=True)
 class ChurningLaw:
-    """Splashing of both gears of a mesh, by one of the named models; reads pinion speed and oil temperature."""
+    """Splashing of both gears of a mesh, by one of the named models; reads input speed and oil temperature.
+
+    ``speed_ratio`` is the pinion's speed over that of the input shaft.
+    """
 
     pair: GearPair
     oil: Oil
     model: str
-    level_below_axis: float  # m
+    level_below_axis: tuple[float, float]  # m
     oil_volume: float  # m^3
     C_Sp: float = 1.0
+    speed_ratio: float = 1.0
 
     @property
     def immersion(self) -> tuple[float, float]:
         """Immersion depths of both gears, [m], at most their diameters; not positive if the gear is dry."""
-        return self._depth(self.pair.r_a[0]), self._depth(self.pair.r_a[1])
+        return self._depth(0, self.pair.r_a), self._depth(1, self.pair.r_a)
 
-    def _depth(self, radius: float) -> float:
-        return min(radius - self.level_below_axis, 2.0 * radius)
+    def _depth(self, gear: int, radii: tuple[float, float]) -> float:
+        return min(radii[gear] - self.level_below_axis[gear], 2.0 * radii[gear])
 
     def power(self, x: Array) -> Array:
         """Churning loss [W], shape (N, 1), at speed [1/min] and oil temperature [degC], shape (N, 2)."""
-        omega_1, T_oil = x[:, 0] * RPM, x[:, 1]
+        omega_1, T_oil = x[:, 0] * self.speed_ratio * RPM, x[:, 1]
         pair, v_t = self.pair, omega_1 * self.pair.r_w[0]
         omega = (omega_1, omega_1 / pair.u)
         match self.model:
@@ -254,7 +258,7 @@ class ChurningLaw:
                 per_gear = [
                     changenet(
                         # Measured at the pitch circle, as theta and D are; the tooth flanks are a separate area.
-                        h=self._depth(pair.r_w[i]),
+                        h=self._depth(i, pair.r_w),
                         r_p=pair.r_w[i],
                         b=pair.b,
                         z=pair.z[i],
@@ -272,18 +276,20 @@ class ChurningLaw:
 
 
 def churning_terms(gearbox: GearboxData) -> Iterator[LossTerm]:
-    """Yield the churning loss of the stage."""
-    stage = gearbox.stage[0]
-    law = ChurningLaw(
-        pair=stage.pair(),
-        oil=gearbox.lubricant(),
-        model=stage.churning.model,
-        level_below_axis=gearbox.oil.level_below_axis,
-        oil_volume=gearbox.oil.volume,
-        C_Sp=stage.churning.C_Sp,
-    )
+    """Yield the churning loss of every stage."""
     inputs = (TermInput("speed_rpm", SPEED), TermInput("T_oil_degC", OIL))
-    yield LossTerm(kind=CHURNING, name="churning", components=CHURNING.components, node=OIL, inputs=inputs, law=law)
+    for name, stage in zip(of_stages("churning", len(gearbox.stage)), gearbox.stage, strict=True):
+        level = gearbox.level_below_axis
+        law = ChurningLaw(
+            pair=stage.pair(),
+            oil=gearbox.lubricant(),
+            model=stage.churning.model,
+            level_below_axis=(level[stage.driver], level[stage.driven]),
+            oil_volume=gearbox.oil.volume,
+            C_Sp=stage.churning.C_Sp,
+            speed_ratio=gearbox.speed_ratio[stage.driver],
+        )
+        yield LossTerm(kind=CHURNING, name=name, components=(name,), node=OIL, inputs=inputs, law=law)
 
 
 CHURNING = LossKind(

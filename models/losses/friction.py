@@ -10,11 +10,21 @@ import numpy as np
 
 from models.base.root_finding import decreasing_root
 from models.base.types import Array, Numeric
+from models.definition.sections import Stage
 from models.formulas import ehl
 from models.formulas.load_sharing import contact_points
 from models.formulas.oil import Oil
 from models.losses.loss_term import MESH as MESH_NODE
-from models.losses.loss_term import SPEED, TORQUE, TORQUE_FLOOR_NM, GearboxData, LossKind, LossTerm, TermInput
+from models.losses.loss_term import (
+    SPEED,
+    TORQUE,
+    TORQUE_FLOOR_NM,
+    GearboxData,
+    LossKind,
+    LossTerm,
+    TermInput,
+    of_stages,
+)
 from models.portable.evaluation import RPM
 
 FILM_TEMPERATURE_TOL = 5e-3  # K, residual of the film temperature
@@ -27,14 +37,22 @@ Roughness = Literal["of_the_law", "mean", "composite", "composite_rms"]
 
 
 def friction_schlenk(
-    *, F_bt_per_b: Numeric, v_sum_C: Numeric, rho_red_C: float, eta_oil: Numeric, Ra: float, X_L: float
+    *,
+    F_bt_per_b: Numeric,
+    v_sum_C: Numeric,
+    rho_red_C: float,
+    eta_oil: Numeric,
+    Ra: float,
+    X_L: float,
+    lowest_load: float = SCHLENK_LOWEST_LOAD,
 ) -> Array:
     r"""Mean friction coefficient of a mesh after Schlenk (ISO/TR 14179-2).
 
     .. math:: \mu_{mZ} = 0.048\left(\frac{F_{bt}/b}{v_{\Sigma C}\,\rho_{redC}}\right)^{0.2}
               \eta_{oil}^{-0.05} Ra^{0.25} X_L
 
-    with the units of the standard (N/mm, m/s, mm, mPa s, um); ``F_bt / b`` counts as 150 N/mm at least.
+    with the units of the standard (N/mm, m/s, mm, mPa s, um); ``F_bt / b`` counts as 150 N/mm at least. WTplus knows
+    no such floor: its map of an e-axle is reproduced without one (tests/validation).
 
     Parameters
     ----------
@@ -50,6 +68,8 @@ def friction_schlenk(
         Mean arithmetic roughness of both flanks, [m]
     X_L : float
         Lubricant factor, [-]; 1 for mineral oil
+    lowest_load : float
+        Least force per face width that counts, [N/m]
 
     Returns
     -------
@@ -69,7 +89,7 @@ def friction_schlenk(
     ...                              Ra=0.1655e-6, X_L=1.0)), 4)
     0.035
     """
-    load = np.maximum(F_bt_per_b, SCHLENK_LOWEST_LOAD) * 1e-3 / (np.asarray(v_sum_C) * rho_red_C * 1e3)
+    load = np.maximum(F_bt_per_b, lowest_load) * 1e-3 / (np.asarray(v_sum_C) * rho_red_C * 1e3)
     return np.asarray(0.048 * load**0.2 * (np.asarray(eta_oil) * 1e3) ** -0.05 * (Ra * 1e6) ** 0.25 * X_L)
 
 
@@ -150,13 +170,16 @@ class MeshContact:
     film: Film = "hamrock_dowson"
     thermal_reduction: ThermalReduction = "gupta"
     rolling_constant: float = 9.0e7
+    lowest_torque: float = TORQUE_FLOOR_NM
+    lowest_load: float = SCHLENK_LOWEST_LOAD
 
     def power(self, x: Array) -> Array:
         """Sliding and rolling loss [W], (N, 2), at speed [1/min], torque [N m], gear temperatures [degC], (N, 4).
 
-        The contact is evaluated at 1 N m at least.
+        The contact is evaluated at `lowest_torque` at least: that of its pinion at 1 N m of the input shaft.
         """
-        losses = self.loss(omega_1=x[:, 0] * RPM, torque=np.maximum(x[:, 1], TORQUE_FLOOR_NM), T_1=x[:, 2], T_2=x[:, 3])
+        torque = np.maximum(x[:, 1], self.lowest_torque)
+        losses = self.loss(omega_1=x[:, 0] * RPM, torque=torque, T_1=x[:, 2], T_2=x[:, 3])
         return np.stack(losses, axis=-1)
 
     def solve(self, *, omega_1: Array, torque: Array, T_1: Array, T_2: Array) -> ContactState:
@@ -232,6 +255,7 @@ class MeshContact:
                 eta_oil=self.oil.dynamic_viscosity(0.5 * (T_1 + T_2)),
                 Ra=0.5 * (self.Ra[0] + self.Ra[1]),
                 X_L=self.oil.schlenk_X_L,
+                lowest_load=self.lowest_load,
             )[:, None]
         else:
             state = self.solve(omega_1=omega_1, torque=torque, T_1=T_1, T_2=T_2)
@@ -337,9 +361,8 @@ class ContactState(Inlet):
     mu: Array
 
 
-def mesh_contact(gearbox: GearboxData) -> MeshContact:
-    """Return the contact of the gearbox's stage."""
-    stage = gearbox.stage[0]
+def mesh_contact(gearbox: GearboxData, stage: Stage) -> MeshContact:
+    """Return the contact of a stage of the gearbox."""
     pair, friction, material = stage.pair(), stage.friction, stage.material
     E, nu = (material.youngs_modulus,) * 2, (material.poisson,) * 2
     t, dx, share = contact_points(pair, model=stage.load_sharing, r_bore=stage.bore_radius, E=E, nu=nu)
@@ -370,18 +393,23 @@ def mesh_contact(gearbox: GearboxData) -> MeshContact:
         film=friction.film,
         thermal_reduction=friction.thermal_reduction,
         rolling_constant=stage.rolling.constant_N_m2,
+        lowest_torque=gearbox.torque_ratio[stage.driver] * TORQUE_FLOOR_NM,
+        lowest_load=0.0 if friction.load_floor is False else SCHLENK_LOWEST_LOAD,
     )
 
 
 def mesh_terms(gearbox: GearboxData) -> Iterator[LossTerm]:
-    """Yield the loss of the stage's mesh; it reads the bulk temperatures of both gears."""
-    inputs = (
-        TermInput("speed_rpm", SPEED),
-        TermInput("torque_Nm", TORQUE),
-        *(TermInput(f"T_{gear}_degC", gear) for gear in gearbox.stage[0].names),
-    )
-    law = mesh_contact(gearbox)
-    yield LossTerm(kind=MESH, name="mesh", components=MESH.components, node=MESH_NODE, inputs=inputs, law=law)
+    """Yield the loss of every stage's mesh; it reads the bulk temperatures of both gears."""
+    count = len(gearbox.stage)
+    components = zip(*(of_stages(component, count) for component in MESH.components), strict=True)
+    for stage, name, own in zip(gearbox.stage, of_stages(MESH_NODE, count), components, strict=True):
+        inputs = (
+            TermInput("speed_rpm", SPEED, gearbox.speed_ratio[stage.driver]),
+            TermInput("torque_Nm", TORQUE, gearbox.torque_ratio[stage.driver]),
+            *(TermInput(f"T_{gear}_degC", gear) for gear in stage.names),
+        )
+        law = mesh_contact(gearbox, stage)
+        yield LossTerm(kind=MESH, name=name, components=own, node=name, inputs=inputs, law=law)
 
 
 MESH = LossKind(

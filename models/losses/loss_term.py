@@ -31,7 +31,7 @@ SPEED, TORQUE = "speed", "torque"
 
 
 class GearboxData(Protocol):
-    """The tables of a definition that loss terms are made from; :class:`models.assembly.gearbox.Gearbox` has them."""
+    """Tables that loss terms are made from; a :class:`~models.assembly.gearbox_definition.Definition` has them."""
 
     @property
     def stage(self) -> tuple[Stage, ...]: ...  # noqa: D102
@@ -45,7 +45,22 @@ class GearboxData(Protocol):
     def ambient(self) -> Ambient: ...  # noqa: D102
     @property
     def speed_ratio(self) -> Mapping[str, float]: ...  # noqa: D102
+    @property
+    def torque_ratio(self) -> Mapping[str, float]: ...  # noqa: D102
+    @property
+    def level_below_axis(self) -> Mapping[str, float]: ...  # noqa: D102
     def lubricant(self) -> Oil: ...  # noqa: D102
+
+
+def of_stages(name: str, stages: int) -> tuple[str, ...]:
+    """Names of what every stage has: the bare name in a gearbox of one stage, else numbered.
+
+    Examples
+    --------
+    >>> of_stages("mesh", 1), of_stages("mesh", 2)
+    (('mesh',), ('mesh_1', 'mesh_2'))
+    """
+    return (name,) if stages == 1 else tuple(f"{name}_{number}" for number in range(1, stages + 1))
 
 
 class Law(Protocol):

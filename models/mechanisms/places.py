@@ -4,7 +4,8 @@ A pattern is a name, a group (its members together), or ``each`` and a group (on
 
 - source, link: nodes. ``oil``, ``housing``, ``each bearings``, ``each parts`` (of all there are); of a link also both
   ends, ``each bearings-returns``, the other one a boundary or a group of one
-- loss_factor: sources. ``losses``, all that are mechanical; ``mesh_sliding``; the losses in a group of nodes,
+- loss_factor: sources. ``losses``, all that are mechanical; ``mesh_sliding``, that of all stages, which are numbered
+  where there are several; the losses in a group of nodes,
   ``each bearings``; those in the nodes of a group that hang on one member of another, ``each shafts>bearings``; those
   that a factor of the network multiplies, ``factor seal``; several together, ``mesh_sliding+mesh_rolling``; with
   links that change with them, ``churning+oil-gears``
@@ -28,6 +29,7 @@ from models.simulation.thermal_network import ThermalNetwork
 from models.terms.term import Kind
 
 EACH, FACTOR, ALL_LOSSES, ALL_PARTS = "each ", "factor ", "losses", "parts"
+STAGE_NUMBER = re.compile(r"_\d+$")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,7 +130,7 @@ def _sources(network: ThermalNetwork, pattern: str) -> Iterator[Placement]:
         for source in network.sources
         if source.is_loss
         and any(
-            name in (source.name, ALL_LOSSES)
+            name in (source.name, STAGE_NUMBER.sub("", source.name), ALL_LOSSES)
             or (name in network.groups and source.node in network.groups[name])
             or (name.startswith(FACTOR) and symbol(name.removeprefix(FACTOR)) in source.heat.free_symbols)
             for name in wanted

@@ -127,6 +127,7 @@ WRONG = {
         "--dask nonsense": "no dask scheduler answers at nonsense",
     },
     "conceal": {
+        "--gearbox two_stage --effect windage --seed 1": "two_stage.toml: has 2 stages; concealed cases are made of",
         "--effect windge --seed 1": "did you mean 'windage'?",
         "--effect windage --random --seed 1": "either --effect NAME or --random",
         "--effect windage --seed 1 --truth out/recordings": "the truth must not lie among the recordings",

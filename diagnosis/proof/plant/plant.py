@@ -13,6 +13,7 @@ import numpy as np
 
 from diagnosis.proof.plant.anatomy import MESH, OIL, SPLASH, SUMP, Anatomy
 from diagnosis.proof.plant.cycles import reference_torque, top_speed
+from diagnosis.proof.plant.sizes import refuse_unbuilt
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 
@@ -57,6 +58,7 @@ class Plant:
     """All gearboxes of one definition."""
 
     def __init__(self, gearbox: Gearbox) -> None:
+        refuse_unbuilt(gearbox)
         self.gearbox = gearbox
         self.anatomy = Anatomy(gearbox)
         nominal = gearbox.losses()

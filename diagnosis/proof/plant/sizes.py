@@ -17,6 +17,22 @@ ADDED = ("input", "boundary", "part", "link", "heat")  # tables that plants do n
 T_SERVICE = 60.0  # degC, where the properties of the oil are taken that plants hold constant
 
 
+def refuse_unbuilt(gearbox: Gearbox) -> None:
+    """Raise InputError for a definition with geometry that no plant is built of."""
+    if (count := len(gearbox.stage)) > 1:
+        raise InputError(
+            f"{gearbox.file}: has {count} stages; concealed cases are made of gearboxes of one stage, in the zoo of "
+            "definitions without geometry too: give one of these"
+        )
+    if any(bearing.load_share is None for bearing in gearbox.bearing):
+        raise InputError(f"{gearbox.file}: has bearings with position_mm; concealed cases need their load_share")
+    if added := [key for key in ADDED if getattr(gearbox.geometry, key)]:
+        raise InputError(
+            f"{gearbox.file}: has [[{']], [['.join(added)}]]; plants are made of teeth, shafts, bearings and housing "
+            "alone: leave these tables out"
+        )
+
+
 @dataclass(frozen=True)
 class BoxSizes:
     """Sizes of one gearbox.
@@ -24,23 +40,10 @@ class BoxSizes:
     Parameters
     ----------
     gearbox : Gearbox
-        With geometry; only its first stage counts
-
-    Raises
-    ------
-    InputError
-        If it has parts, heat paths or heats besides its geometry.
+        With geometry, of one stage
     """
 
     gearbox: Gearbox
-
-    def __post_init__(self) -> None:
-        added = [key for key in ADDED if getattr(self.gearbox.geometry, key)]
-        if added:
-            raise InputError(
-                f"{self.gearbox.file}: has [[{']], [['.join(added)}]]; plants are made of teeth, shafts, bearings and "
-                "housing alone: leave these tables out"
-            )
 
     @cached_property
     def pair(self) -> GearPair:

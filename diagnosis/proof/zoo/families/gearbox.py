@@ -402,7 +402,7 @@ class _Gearbox:
         f_0, f_1 = b.uniform(2.2, 4.0), b.uniform(2e-4, 4e-4)
         R_1, mu_bl = b.uniform(0.9, 1.3) * 1e-6, b.uniform(0.05, 0.13)
         for bearing in self.gearbox.bearing:
-            name, ratio, share = bearing.name, sizes.ratio(bearing.shaft), bearing.load_share
+            name, ratio, share = bearing.name, sizes.ratio(bearing.shaft), float(bearing.load_share or 0.0)
             self._bearing_loss(name, ratio, share, (f_0, f_1, R_1, mu_bl))
 
     def _bearing_loss(self, name: str, ratio: float, share: float, numbers: tuple[float, float, float, float]) -> None:

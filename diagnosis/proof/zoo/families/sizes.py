@@ -10,7 +10,7 @@ import numpy as np
 
 from diagnosis.proof.plant.cycles import reference_torque, top_speed
 from diagnosis.proof.plant.plant import REFERENCE_SPEED
-from diagnosis.proof.plant.sizes import BoxSizes
+from diagnosis.proof.plant.sizes import BoxSizes, refuse_unbuilt
 from diagnosis.proof.zoo.families.losses import RPM, Dip, Roller
 from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError
@@ -25,11 +25,7 @@ def refuse_unsplit(gearbox: Gearbox) -> None:
             f"{gearbox.file}: has no geometry; this family splits gearboxes with teeth, shafts and bearings: name a "
             "family for definitions without geometry"
         )
-    if len(gearbox.stage) != 1:
-        raise InputError(
-            f"{gearbox.file}: has {len(gearbox.stage)} stages; the zoo splits gearboxes of one stage and definitions "
-            "without geometry: give one of these"
-        )
+    refuse_unbuilt(gearbox)
 
 
 class Sizes(BoxSizes):

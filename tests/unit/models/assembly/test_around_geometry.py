@@ -11,8 +11,9 @@ import pytest
 from builder.fmi.reference_cycle import reference_cycle
 from builder.workflows.understood import understood
 from diagnosis.proof.plant.plant import Plant
-from models.assembly.gearbox import Gearbox, load_gearbox
+from models.assembly.gearbox import Gearbox, load_gearbox, read_gearbox
 from models.base.errors import InputError
+from models.files.toml_file import packaged, read_text
 from models.mechanisms import Scale
 from models.network.laws import symbol
 from tests.unit.models.around_fzg import TABLES, around_fzg
@@ -145,6 +146,33 @@ def test_typical_sizes_count_them(machine: Gearbox, fzg: Gearbox) -> None:
     assert Scale.of(machine, inputs={"coolant_flow": 2.0}).conductance - Scale.of(fzg).conductance == pytest.approx(
         29.0
     )
+
+
+def test_several_stages_have_surroundings_too() -> None:
+    """Heat in the second mesh warms the oil, whose cooler takes it; numbered names are the model's."""
+    text = read_text(packaged("gearboxes", "two_stage"))
+    tables = """
+[[boundary]]
+name = "coolant"
+input = "T_coolant"
+temperature_degC = 30.0
+
+[[link]]
+between = ["oil", "coolant"]
+conductance_W_K = 50.0
+
+[[heat]]
+name = "brake"
+part = "mesh_2"
+heat_W = "100.0 + 0.0 * T_mesh_1"
+"""
+    two = read_gearbox(text + tables, file="two.toml")
+    assert two.network().node_names[2] == "coolant" and two.network().sources[-1].node == "mesh_2"
+    result = two.simulate({"time_s": [0.0, 1e6, 1e6 + 100.0], "speed_rpm": [0.0] * 3, "torque_Nm": [0.0] * 3})
+    assert sum(heat[2] - heat[1] for heat in result.heat_to.values()) == pytest.approx(100.0 * 100.0, rel=1e-3)
+    for old, new in (('"brake"', '"churning_2"'), ('name = "coolant"', 'name = "mesh_2"')):
+        with pytest.raises(InputError, match="is a loss of the gearbox|'mesh_2' is given 2 times"):
+            read_gearbox(text + tables.replace(old, new, 1), file="two.toml")
 
 
 def test_a_plant_of_the_geometry_alone_refuses_them(machine: Gearbox) -> None:

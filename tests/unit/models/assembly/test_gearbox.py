@@ -84,7 +84,7 @@ def test_conveyor_differs_and_loads() -> None:
 
 
 def test_bundled_names_and_files(tmp_path: Path, fzg: Gearbox) -> None:
-    assert known_gearboxes() == ("conveyor", "fzg", "heated_rod", "helical", "la_haute_borne", "reducer")
+    assert known_gearboxes() == ("conveyor", "fzg", "heated_rod", "helical", "la_haute_borne", "reducer", "two_stage")
     path = tmp_path / "mine.toml"
     path.write_text(FZG, encoding="utf-8")
     assert load_gearbox(path).hash == load_gearbox(str(path)).hash == fzg.hash

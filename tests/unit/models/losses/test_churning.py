@@ -63,7 +63,11 @@ MODELS = ("niemann", "niemann_printed", "mauz", "changenet_velex", "changenet_20
 def churning(pair: GearPair, model: str, speed: float, level_below_axis: float) -> float:
     """Loss in W at a speed in 1/min of the first gear."""
     law = ChurningLaw(
-        pair=pair, oil=GEARBOX.lubricant(), model=model, level_below_axis=level_below_axis, oil_volume=1e-3
+        pair=pair,
+        oil=GEARBOX.lubricant(),
+        model=model,
+        level_below_axis=(level_below_axis, level_below_axis),
+        oil_volume=1e-3,
     )
     return float(law.power(np.array([[speed, 60.0]]))[0, 0])
 

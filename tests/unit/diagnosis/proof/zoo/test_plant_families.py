@@ -125,7 +125,7 @@ def test_a_definition_with_two_stages_is_refused():
     class TwoStages:
         file, is_parametric, stage = "two.toml", False, gearbox.stage * 2
 
-    with pytest.raises(InputError, match=r"two.toml: has 2 stages; the zoo splits gearboxes of one stage"):
+    with pytest.raises(InputError, match=r"two.toml: has 2 stages; concealed cases are made of gearboxes of one stage"):
         FAMILIES["walls"].draw(TwoStages(), np.random.default_rng(0))
 
 
