@@ -6,7 +6,7 @@ Each function returns Markdown; nothing of it is kept in the repository.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from models.assembly.gearbox_definition import Definition
 from models.correction.correction import Correction
 from models.definition.key_texts import TEXTS, KeyText
 from models.definition.known_bearings import known_series
+from models.definition.machine_definition import MachineDefinition
 from models.definition.named_oils import known_oils, lubricant, named_oil, read_oil
 from models.definition.parametric_sections import ParametricDefinition
 from models.definition.values_with_source import Annotations, strip
@@ -99,7 +100,8 @@ class _Quiet(GenerateJsonSchema):
 class _Tables:
     """Reference of one file: a heading and a table of keys for every pydantic model in it."""
 
-    def __init__(self, model: type[BaseModel], example: str | None) -> None:
+    def __init__(self, model: type[BaseModel], example: str | None, *, only: Container[str] | None = None) -> None:
+        self.only = only  # keys at the top of the file
         self.schema = model.model_json_schema(by_alias=True, schema_generator=_Quiet)
         self.definitions: Mapping[str, Schema] = self.schema.get("$defs", {})
         self.values: Mapping[str, Any] = {}
@@ -110,8 +112,11 @@ class _Tables:
 
     def markdown(self) -> Iterator[str]:
         """Yield the lines."""
-        yield from self._section(self.root, "At the top of the file", self.schema, self.values)
-        yield from self._below(self.schema, (), self.values)
+        keys = self.schema["properties"]
+        schema = {**self.schema, "properties": {k: v for k, v in keys.items() if self.only is None or k in self.only}}
+        if not all(map(_table_in, schema["properties"].values())):
+            yield from self._section(self.root, "At the top of the file", schema, self.values)
+        yield from self._below(schema, (), self.values)
 
     def _below(self, schema: Schema, path: tuple[str, ...], values: Any) -> Iterator[str]:
         for key, field in schema["properties"].items():
@@ -212,13 +217,23 @@ def _value(value: Any) -> str:
 
 
 def definition() -> Iterator[str]:
-    """Tables and keys of a definition with geometry."""
-    yield from _Tables(Definition, EXAMPLES[Definition]).markdown()
+    """Tables and keys that only a definition with geometry has."""
+    yield from _Tables(Definition, EXAMPLES[Definition], only=_keys(Definition) - _keys(MachineDefinition)).markdown()
 
 
 def definition_without_geometry() -> Iterator[str]:
-    """Tables and keys of a definition without geometry."""
-    yield from _Tables(ParametricDefinition, EXAMPLES[ParametricDefinition]).markdown()
+    """Tables and keys that only a definition without geometry has."""
+    own = _keys(ParametricDefinition) - _keys(MachineDefinition)
+    yield from _Tables(ParametricDefinition, EXAMPLES[ParametricDefinition], only=own).markdown()
+
+
+def definition_of_both() -> Iterator[str]:
+    """Tables and keys that every definition may have."""
+    yield from _Tables(ParametricDefinition, EXAMPLES[ParametricDefinition], only=_keys(MachineDefinition)).markdown()
+
+
+def _keys(model: type[MachineDefinition]) -> set[str]:
+    return {field.alias or name for name, field in model.model_fields.items()}
 
 
 def mapping() -> Iterator[str]:
@@ -342,6 +357,7 @@ GENERATORS: Mapping[str, Callable[[], Iterator[str]]] = {
     "bearings": bearings,
     "correction": correction,
     "definition": definition,
+    "definition_of_both": definition_of_both,
     "definition_without_geometry": definition_without_geometry,
     "mapping": mapping,
     "mechanisms": mechanisms,

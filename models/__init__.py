@@ -5,7 +5,8 @@ The way from a definition file to temperatures, which is also an order to read t
 1. ``files.toml_file``, ``definition``: the tables of a file become sections, every value checked once.
 2. ``assembly.gearbox``: a :class:`~models.assembly.gearbox.Gearbox` is a definition with what follows from it:
    ``losses`` (:mod:`~models.losses.loss_model`) and thermal network (``assembly.gearbox_network``; without geometry
-   ``assembly.parametric``). ``formulas`` holds the correlations of both, each with its source.
+   ``assembly.parametric``; what both may add, ``assembly.table_builder``). ``formulas`` holds the correlations of both,
+   each with its source.
 3. ``network``: a network is nodes, parameters and symbolic laws (``structure``, ``laws``); ``compiled`` makes numpy
    functions of them.
 4. ``simulation``: :class:`~models.simulation.thermal_network.ThermalNetwork` simulates a cycle or finds a steady

@@ -11,7 +11,8 @@ from diagnosis.proof.zoo.structure import Law, Moment, ZooPlant
 from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError
 from models.base.types import Array
-from models.definition.parametric_sections import Loss, ParametricDefinition, Path
+from models.definition.machine_definition import Path
+from models.definition.parametric_sections import Loss, ParametricDefinition
 from models.formulas.oil import kinematic_viscosity_d341
 from models.quantities.units import find_unit
 

@@ -21,15 +21,17 @@ KNOTS = np.array([
     [600.0, 0.08, 0.06],
 ])  # fmt: skip
 COLD_START = 20.0  # degC
-# Without geometry: time [s] and share of the way from an input's default to its level.
+WARMER = 20.0  # K, of surroundings with geometry: networks of losses have a range of temperatures
+# Of inputs that the definition names, without geometry of all: time [s] and share of the way from default to level.
 RAMP = np.array([[0.0, 0.0], [60.0, 0.0], [120.0, 1.0], [420.0, 1.0], [480.0, 0.0], [600.0, 0.0]])
 
 
 def reference_cycle(gearbox: Gearbox, *, step_s: float = 1.0) -> Cycle:
-    """The reference cycle of a gearbox, scaled to its training bounds.
+    """The reference cycle of a gearbox: speed and torque scaled to its training bounds, 20 degC, the usual air speed.
 
-    Without geometry, all inputs go from their defaults to a level and back: speed and torque to their typical
-    operation, an input with a range of the definition halfway to the bound that is further away.
+    Inputs that a definition names go from their defaults to a level and back: one with a range of the definition
+    halfway to the bound that is further away, with geometry temperatures by 20 K. Without geometry speed and torque go
+    to their typical operation so.
 
     Parameters
     ----------
@@ -50,34 +52,35 @@ def reference_cycle(gearbox: Gearbox, *, step_s: float = 1.0) -> Cycle:
     (601, 280.0)
     """
     time = np.linspace(0.0, KNOTS[-1, 0], round(KNOTS[-1, 0] / step_s) + 1)
+    share = np.interp(time, RAMP[:, 0], RAMP[:, 1])
+    courses = {name: low + share * (level - low) for name, (low, level) in _levels(gearbox).items()}
     if gearbox.is_parametric:
-        share = np.interp(time, RAMP[:, 0], RAMP[:, 1])
-        levels = _levels(gearbox)
-        return Cycle(time, {name: default + share * (level - default) for name, (default, level) in levels.items()})
-    speed = np.interp(time, KNOTS[:, 0], KNOTS[:, 1]) * gearbox.training.speed_rpm[1]
-    torque = np.interp(time, KNOTS[:, 0], KNOTS[:, 2]) * gearbox.training.torque_Nm[1]
-    columns = {
-        "time_s": time,
-        "speed_rpm": speed,
-        "torque_Nm": torque,
-        "T_ambient_degC": np.full_like(time, COLD_START),
-        "air_speed_m_s": np.full_like(time, gearbox.ambient.air_speed_m_s),
-    }
-    return Cycle.from_columns(columns)
+        return Cycle(time, courses)
+    bounds = {"speed": gearbox.training.speed_rpm[1], "torque": gearbox.training.torque_Nm[1]}
+    courses |= {name: np.interp(time, KNOTS[:, 0], KNOTS[:, i]) * bounds[name] for i, name in enumerate(bounds, 1)}
+    return Cycle(time, courses | {"T_ambient": np.full_like(time, COLD_START)})
 
 
 def _levels(gearbox: Gearbox) -> dict[str, tuple[float, float]]:
-    """Default and level of every input of a gearbox without geometry."""
+    """Default and level of every input."""
     typical = dict(zip(("speed", "torque"), gearbox.typical_operation, strict=True))
     return {
-        name: (given.default, typical[name] if name in typical else _inside(given))
+        name: (given.default, typical[name] if name in typical else _inside(given, nearby=not gearbox.is_parametric))
         for name, given in gearbox.network().inputs.items()
     }
 
 
-def _inside(given: Input) -> float:
-    """A value well inside the range of an input and away from its default; the default where there is no range."""
+def _inside(given: Input, *, nearby: bool) -> float:
+    """A value inside the range of an input and away from its default; the default where there is no range.
+
+    Parameters
+    ----------
+    nearby : bool
+        True for a temperature that is 20 K warmer at most
+    """
     low, high = given.quantity.low, given.quantity.high
     if given.name in GEARBOX_INPUTS or not np.isfinite(high - low):
         return given.default
+    if nearby and given.quantity.is_temperature:
+        return min(given.default + WARMER, high)
     return 0.5 * (given.default + (high if high - given.default >= given.default - low else low))

@@ -19,7 +19,6 @@ from models.portable.evaluation import RPM
 from models.simulation.thermal_network import ThermalNetwork
 
 SHARES = (("low", 0.1), ("mid", 0.5), ("rated", 1.0))  # of the largest speed, torque and other inputs
-WARM_degC = 60.0  # of all parts, where the definition states no other temperature
 OIL_degC = (20.0, 60.0, 100.0)
 HOTTEST_DEGC = 250.0  # beyond it nothing of a gearbox is left, and no formula holds
 SHOWN_WHOLE = 1000.0  # from which numbers have no decimals
@@ -44,7 +43,11 @@ def understood(gearbox: Gearbox) -> list[Grid]:
     gearbox : Gearbox
     """
     network = gearbox.network()
-    tables = [_nodes(gearbox, network), _links(gearbox, network), _inputs(network), _heats(gearbox, network)]
+    tables = [_nodes(gearbox, network), _links(gearbox, network), _inputs(network)]
+    if gearbox.loss_laws().components:
+        tables.append(_losses(gearbox))
+    if any(not source.is_loss for source in network.sources):
+        tables.append(_heats(gearbox, network))
     if "oil" in {part.name for part in network.parts}:
         tables.append(_oil(gearbox))
     return tables if gearbox.is_parametric else [*tables, _steady(gearbox), _bearing_loads(gearbox), *_gears(gearbox)]
@@ -69,7 +72,8 @@ def _steady(gearbox: Gearbox) -> Grid:
 
 
 def _gears(gearbox: Gearbox) -> Iterator[Grid]:
-    (_, torque), geometry = _largest(gearbox), gearbox.geometry
+    geometry = gearbox.geometry
+    _, torque, _ = geometry.full_operation
     for number, stage in enumerate(gearbox.stage, start=1):
         pair, levels = stage.pair(), [geometry.level_below_axis[shaft] for shaft in (stage.driver, stage.driven)]
         rows = [
@@ -86,7 +90,7 @@ def _gears(gearbox: Gearbox) -> Iterator[Grid]:
 
 
 def _bearing_loads(gearbox: Gearbox) -> Grid:
-    (speed, torque), loads = _largest(gearbox), bearing_loads(gearbox.geometry)
+    (speed, torque, _), loads = gearbox.geometry.full_operation, bearing_loads(gearbox.geometry)
     rows = [
         [bearing.name, f"{speed * gearbox.speed_ratio[bearing.shaft]:.4g}", f"{torque * load.radial:.4g}",
          f"{torque * load.radial * load.axial_share:.4g}"]
@@ -102,27 +106,17 @@ def conductances(gearbox: Gearbox, network: ThermalNetwork) -> dict[str, float]:
     return {link.name: _value(link.conductance, network, values) for link in network.links}
 
 
-def _warm(gearbox: Gearbox) -> float:
-    return WARM_degC if not gearbox.is_parametric else gearbox.definition.operation.temperature_degC  # type: ignore[union-attr]
-
-
-def _largest(gearbox: Gearbox) -> tuple[float, float]:
-    """Speed [1/min] and torque [N m] that count as rated."""
-    if gearbox.is_parametric:
-        return gearbox.typical_operation
-    return gearbox.training.speed_rpm[1], gearbox.training.torque_Nm[1]
-
-
 def _signals(gearbox: Gearbox, network: ThermalNetwork, share: float) -> dict[str, float]:
     """Time, inputs, temperatures of parts and parameters by name, at a share of what is rated."""
-    speed, torque = (share * value for value in _largest(gearbox))
+    speed, torque, warm = gearbox.definition.full_operation
     values = {"time": 0.0, **{p.name: p.start for p in network.parameters}}
     for name, known in network.inputs.items():
         low, high = known.quantity.low, known.quantity.high
         driven = not known.quantity.is_temperature and np.isfinite(high) and name != "air_speed"
         values[name] = low + share * (high - low) if driven else known.default
-    values |= {name: value for name, value in (("speed", speed), ("torque", torque)) if name in network.inputs}
-    return values | {f"T_{part.name}": _warm(gearbox) for part in network.parts}
+    driven_by = {"speed": share * speed, "torque": share * torque}
+    values |= {name: value for name, value in driven_by.items() if name in network.inputs}
+    return values | {f"T_{part.name}": warm for part in network.parts}
 
 
 def _value(law: sp.Expr, network: ThermalNetwork, values: Mapping[str, float]) -> float:
@@ -156,7 +150,8 @@ def _links(gearbox: Gearbox, network: ThermalNetwork) -> Grid:
     for link in network.links:
         varies = sorted({s.name for s in link.conductance.free_symbols} - constants)
         rows.append([" - ".join(link.nodes), ", ".join(varies) or "constant", _number(found[link.name])])
-    title = f"{len(network.links)} links; conductances in W/K at mid operation, parts at {_warm(gearbox):g} degC"
+    *_, warm = gearbox.definition.full_operation
+    title = f"{len(network.links)} links; conductances in W/K at mid operation, parts at {warm:g} degC"
     return Grid(title, ["between", "depends on", "W/K"], rows, 2)
 
 
@@ -170,21 +165,25 @@ def _inputs(network: ThermalNetwork) -> Grid:
 
 
 def _heats(gearbox: Gearbox, network: ThermalNetwork) -> Grid:
-    """Losses by component at three operating points; of a machine without losses its heats."""
+    """Heats that are no losses, at three values of all inputs."""
     points = [_signals(gearbox, network, share) for _, share in SHARES]
-    laws = gearbox.loss_laws()
-    if not laws.components:
-        heats = [[_value(source.heat, network, values) for source in network.sources] for values in points]
-        names = [f"{source.name} in {source.node}" for source in network.sources]
-        return _by_point("Heats in W, inputs at 10, 50 and 100 % of their range", names, np.array(heats))
-    speed, torque = (np.array([share * value for _, share in SHARES]) for value in _largest(gearbox))
-    temperatures = np.full((len(SHARES), len(laws.temperature_nodes)), _warm(gearbox))
+    sources = [source for source in network.sources if not source.is_loss]
+    heats = [[_value(source.heat, network, values) for source in sources] for values in points]
+    names = [f"{source.name} in {source.node}" for source in sources]
+    return _by_point("Heats in W, inputs at 10, 50 and 100 % of their range", names, np.array(heats))
+
+
+def _losses(gearbox: Gearbox) -> Grid:
+    """Losses by component at three operating points."""
+    laws, (*rated, warm) = gearbox.loss_laws(), gearbox.definition.full_operation
+    speed, torque = (np.array([share * value for _, share in SHARES]) for value in rated)
+    temperatures = np.full((len(SHARES), len(laws.temperature_nodes)), warm)
     losses = np.asarray(laws.power(speed, torque, temperatures))
     at = "; ".join(
         f"{name} {_number(n)} 1/min, {_number(M)} N m" for (name, _), n, M in zip(SHARES, speed, torque, strict=True)
     )
     end = "[reference]" if gearbox.is_parametric else "the end of [training]"
-    title = f"Losses in W, all parts at {_warm(gearbox):g} degC; rated is {end}\n({at})"
+    title = f"Losses in W, all parts at {warm:g} degC; rated is {end}\n({at})"
     table = _by_point(title, list(laws.components), losses)
     power = speed * RPM * torque
     share = [f"{100.0 * value:.3g} %" for value in losses.sum(axis=1) / power]

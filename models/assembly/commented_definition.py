@@ -12,7 +12,8 @@ from models.assembly.gearbox import FOLDER
 from models.assembly.gearbox_definition import Definition
 from models.definition.definition_file import OIL_OF_SEAL
 from models.definition.key_texts import TEXTS
-from models.definition.parametric_sections import KEY, ParametricDefinition
+from models.definition.machine_definition import has_geometry
+from models.definition.parametric_sections import ParametricDefinition
 from models.files.toml_file import packaged, parse, read_text
 
 HEADER = """\
@@ -56,7 +57,7 @@ def commented_definition(like: str, *, name: str, file: str, schema: str) -> str
     lines = text.splitlines()
     lines = lines[lines.index("") + 1 :]  # without the head of that machine
     document = parse(text, file=like)
-    comments = _Comments(ParametricDefinition if KEY in document else Definition)
+    comments = _Comments(Definition if has_geometry(document) else ParametricDefinition)
     written = [*HEADER.format(name=name, like=like, file=file, schema=schema).splitlines(), ""]
     own = {"name": name, "source": f"begun from {like}: {document['source']}"}
     for line in lines:

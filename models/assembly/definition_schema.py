@@ -15,8 +15,9 @@ from models.definition.bearing_section import Bearing
 from models.definition.definition_file import LIKE_KEYS
 from models.definition.key_texts import TEXTS
 from models.definition.known_bearings import FILLED, known_bearings
+from models.definition.machine_definition import PART, STAGE
 from models.definition.named_oils import known_oils
-from models.definition.parametric_sections import KEY, ParametricDefinition
+from models.definition.parametric_sections import ParametricDefinition
 from models.definition.sections import Oil
 from models.definition.values_with_source import join
 from models.quantities.definition_units import unit_of
@@ -61,7 +62,7 @@ def definition_schema() -> Schema:
         "type": "object",
         "additionalProperties": False,
         "properties": keys | differing,  # not below "then" alone, where Even Better TOML completes nothing
-        "if": {"required": [KEY], "additionalProperties": True},
+        "if": {"required": [PART], "not": {"required": [STAGE]}, "additionalProperties": True},
         "then": _kind(parametric, keys, differing),
         "else": _kind(geometry, keys, differing),
         "definitions": SHARED | tables,
@@ -168,7 +169,7 @@ def _key(table: str, key: str, schema: Schema) -> Schema:
     """One key: its plain value, or that with its standard deviation and source."""
     plain: Schema = _draft_7({name: item for name, item in schema.items() if name not in ("title", "default")})
     told: Schema = {"title": key, "description": key_line(table, key, limits_of(schema))}
-    if schema.get("default") is not None:
+    if schema.get("default") not in (None, []):
         told["default"] = schema["default"]
     if table == Oil.__name__ and key == "named":
         plain = {"enum": list(known_oils())}

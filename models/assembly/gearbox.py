@@ -17,19 +17,16 @@ from typing import TYPE_CHECKING, Any, Self
 from numpy.typing import ArrayLike
 
 from models.assembly.gearbox_definition import Definition
-from models.assembly.gearbox_network import build_network
-from models.assembly.parametric import (
-    ParametricLosses,
-    build_parametric_network,
-    law_faults,
-    with_losses_as_laws,
-)
+from models.assembly.gearbox_network import build_network, joined_already
+from models.assembly.law_faults import law_faults
+from models.assembly.parametric import ParametricLosses, build_parametric_network, with_losses_as_laws
 from models.base.errors import InputError, did_you_mean
 from models.definition.bearing_section import Bearing
 from models.definition.definition_file import fault_lines, placed, read_values, refilled, refuse
+from models.definition.machine_definition import MachineDefinition, has_geometry
 from models.definition.messages import validate_section
 from models.definition.nested_values import leaves_of, plain, with_value
-from models.definition.parametric_sections import KEY, ParametricDefinition
+from models.definition.parametric_sections import ParametricDefinition
 from models.definition.sections import Ambient, Housing, Oil, Seal, Shaft, Stage, Training
 from models.definition.values_with_source import Annotations
 from models.files.cycle import Cycle
@@ -171,8 +168,10 @@ class Gearbox:
     def values(self) -> Mapping[str, Any]:
         """All values as plain tables, defaults included, absent ones left out."""
         dumped = self.definition.model_dump(by_alias=True, exclude_none=True)
-        # Lists that a definition without geometry leaves out are no part of its hash.
-        return {key: value for key, value in dumped.items() if value != () or not self.is_parametric}
+        # Lists that a definition without geometry leaves out are no part of its hash; with geometry these tables.
+        if self.is_parametric:
+            return {key: value for key, value in dumped.items() if value != ()}
+        return {key: value for key, value in dumped.items() if value or key not in MachineDefinition.model_fields}
 
     @cached_property
     def leaves(self) -> Mapping[str, Any]:
@@ -490,8 +489,10 @@ def read_gearbox(text: str, *, file: str) -> Gearbox:
 
 
 def _validate(values: Mapping[str, Any], *, file: str) -> Definition | ParametricDefinition:
-    if KEY in values:
+    if not has_geometry(values):
         definition = validate_section(ParametricDefinition, values, file=file)
         refuse(law_faults(definition), values, file=file)
         return definition
-    return validate_section(Definition, values, file=file)
+    gearbox = validate_section(Definition, values, file=file)
+    refuse([*joined_already(gearbox), *law_faults(gearbox)], values, file=file)
+    return gearbox

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Literal, Self
+from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
 from models.base.errors import did_you_mean
 from models.definition.bearing_section import Bearing
+from models.definition.machine_definition import MachineDefinition
+from models.definition.machine_faults import input_faults, link_faults, name_faults
 from models.definition.named_oils import lubricant
 from models.definition.sections import (
     Ambient,
@@ -19,16 +21,15 @@ from models.definition.sections import (
     Oil,
     OneOrMore,
     Seal,
-    Section,
     Shaft,
     Stage,
-    Text,
     Training,
 )
 from models.formulas.oil import Oil as Lubricant
 from models.losses.loss_model import loss_components, loss_factors
 from models.losses.loss_term import MESH, OIL, of_stages
 from models.quantities.definition_units import between
+from models.quantities.quantities import Input, usual_inputs
 
 BOUNDARY_NODES = ("air", "frame")
 FACTORS = (
@@ -53,13 +54,12 @@ RESERVED = (
 )
 SHARE_TOLERANCE = 1e-6
 STEPPED = 3.0  # ratio of diameters on one shaft
+WARM_DEGC = 60.0  # of all parts in full operation
 
 
-class Definition(Section):
-    """The whole file."""
+class Definition(MachineDefinition):
+    """The whole file of a gearbox with geometry."""
 
-    schema_number: Literal[1] = Field(alias="schema")
-    name: Text
     ambient: Ambient
     oil: Oil
     shaft: OneOrMore[Shaft]
@@ -75,6 +75,41 @@ class Definition(Section):
     def ambient_degC(self) -> float:
         """Temperature of the surroundings where a recording names none."""
         return self.ambient.temperature_degC
+
+    @property
+    def full_operation(self) -> tuple[float, float, float]:
+        """Speed [1/min] and torque [N m] at the end of ``[training]``, and the temperature of warm parts, [degC]."""
+        return self.training.speed_rpm[1], self.training.torque_Nm[1], WARM_DEGC
+
+    @property
+    def own_inputs(self) -> dict[str, Input]:
+        """Speed, torque, and temperature and speed of the air."""
+        air = self.ambient
+        return usual_inputs(speed=0.0, torque=0.0, T_ambient=air.temperature_degC, air_speed=air.air_speed_m_s)
+
+    @property
+    def own_parts(self) -> tuple[str, ...]:
+        """Parts that follow from the geometry."""
+        return (*_part_names(self), OIL, *self.mesh_names)
+
+    @property
+    def own_boundaries(self) -> tuple[str, ...]:
+        """Air and frame."""
+        return BOUNDARY_NODES
+
+    @property
+    def own_signals(self) -> tuple[str, ...]:
+        """Factors and losses of the geometry."""
+        return (*self.factor_names, *(f"P_{name}" for name in self.own_losses))
+
+    @property
+    def own_losses(self) -> tuple[str, ...]:
+        """Names of losses: the fixed ones of every stage, bearings and seals."""
+        return (
+            *_numbered_losses(self),
+            *(bearing.name for bearing in self.bearing),
+            *(seal.name for seal in self.seal),
+        )
 
     @property
     def all_factors(self) -> Mapping[str, float]:
@@ -119,11 +154,12 @@ class Definition(Section):
     @model_validator(mode="after")
     def _tables_agree(self) -> Self:
         # What follows reads the tables by their names, and then the shafts along the stages.
-        faults = [*_duplicate_names(self), *_unknown_names(self)] or [*_chain(self)]
+        faults = [*_duplicate_names(self), *_unknown_names(self), *name_faults(self), *_names_of_the_model(self)]
+        faults = faults or [*_chain(self)]
         faults = faults or [
             *_load_shares(self), *_taper_pairs(self), *_axial_loads(self), *_shafts_in_gears(self),
             *_axis_heights(self), *_seals_on_shafts(self), *_gears_in_housing(self), *_oil_level(self),
-            *_oil_volume(self),
+            *_oil_volume(self), *input_faults(self), *link_faults(self), *_added_to_geometry(self),
         ]  # fmt: skip
         if faults:
             raise ValueError("\n".join(faults))
@@ -166,7 +202,7 @@ def _unknown_names(definition: Definition) -> Iterator[str]:
     for place, name in references:
         if name not in shafts:
             yield f"{place}: there is no shaft '{name}'{did_you_mean(name, shafts)}"
-    nodes = [*_part_names(definition), OIL, *definition.mesh_names]
+    nodes = definition.own_parts
     for node in definition.node:
         if node.name in BOUNDARY_NODES:
             yield f"node '{node.name}': is a boundary, and has no heat capacity"
@@ -175,6 +211,35 @@ def _unknown_names(definition: Definition) -> Iterator[str]:
     for name in definition.factors:
         if name not in definition.factor_names:
             yield f"factors: '{name}' is not a known factor{did_you_mean(name, definition.factor_names)}"
+
+
+def _names_of_the_model(definition: Definition) -> Iterator[str]:
+    """Refuse added parts, boundaries and heats that are called as something of the model."""
+    added = [*(part.name for part in definition.part), *(boundary.name for boundary in definition.boundary)]
+    nodes = (*definition.own_parts, *definition.own_boundaries)  # reported as given twice
+    for name in added:
+        if name in (*RESERVED, *_numbered_losses(definition), "housing") and name not in nodes:
+            yield f"name '{name}' is taken by the model itself; choose another"
+    for heat in definition.heat:
+        for name in (heat.name, *(f"{heat.name}_{part}" for part in heat.parts)):
+            if name in (*definition.own_losses, "total"):
+                yield f"heat '{heat.name}': '{name}' is a loss of the gearbox; choose another name"
+
+
+def _added_to_geometry(definition: Definition) -> Iterator[str]:
+    """Refuse in added tables what the geometry has already, or lacks."""
+    for given in definition.input:
+        if given.name in definition.own_inputs:
+            yield f"input '{given.name}': is an input of every gearbox with geometry; leave it out"
+    for boundary in definition.boundary:
+        if boundary.input == "T_ambient" and boundary.temperature_degC is not None:
+            yield f"boundary '{boundary.name}'.temperature_degC: T_ambient has its value in [ambient]; leave it out"
+    for number, link in enumerate(definition.link, start=1):
+        if link.standstill_share < 1.0:
+            yield (
+                f"link #{number}.standstill_share: needs running_rpm in [reference], which a definition with geometry "
+                "has not; write the part that depends on the speed as factor"
+            )
 
 
 def _chain(definition: Definition) -> Iterator[str]:

@@ -15,6 +15,7 @@ import numpy as np
 import sympy as sp
 
 from models.assembly.gearbox_definition import Definition
+from models.assembly.table_builder import with_tables
 from models.definition.bearing_section import Bearing
 from models.definition.sections import Shaft, Stage
 from models.formulas import heat_transfer as ht
@@ -34,7 +35,6 @@ from models.losses.loss_model import LossModel, loss_factors
 from models.losses.loss_term import MESH, OIL, SPEED_FLOOR_RPM, TORQUE_FLOOR_NM
 from models.network.laws import Parameter, symbol
 from models.portable.evaluation import RPM
-from models.quantities.quantities import usual_inputs
 from models.simulation.thermal_network import Link, Node, Source, ThermalNetwork
 
 AIR, FRAME = "air", "frame"
@@ -67,15 +67,27 @@ def build_network(gearbox: Definition, priors: Mapping[str, float]) -> ThermalNe
     Returns
     -------
     ThermalNetwork
-        With the tunable factors of the definition as parameters, ``T_ambient`` and ``air_speed`` as inputs, and the
-        groups ``housing``, ``bearings``, ``shafts`` and ``gears``
+        With the tunable factors of the definition as parameters, ``T_ambient`` and ``air_speed`` as inputs, the groups
+        ``housing``, ``bearings``, ``shafts`` and ``gears``, and the added inputs, nodes, links and heats of the file
 
     References
     ----------
     Changenet, Oviedo-Marlot, Velex, J. Mech. Des. 128 (2006); Durand de Gevigney, Changenet, Ville, Velex, Mech. Mach.
     Theory 67 (2013). Layout from memory; Table 5 of the paper for the FZG values.
     """
-    return _Builder(gearbox, priors).network()
+    return with_tables(_Builder(gearbox, priors).network(), gearbox, priors)
+
+
+def joined_already(gearbox: Definition) -> list[tuple[str, str]]:
+    """Return ``[[link]]`` between nodes that the geometry joins, as dotted path (none) and message."""
+    own = {frozenset(link.nodes) for link in _Builder(gearbox, {}).links()} if gearbox.link else set()
+    faults = []
+    for number, link in enumerate(gearbox.link, start=1):
+        if frozenset(link.between) in own:
+            known = "foundation_conductance_W_K of [housing] is" if FRAME in link.between else "[factors] scales"
+            pair = " and ".join(link.between)
+            faults.append(("", f"link #{number}.between: {pair} are joined by the geometry already; {known} that path"))
+    return faults
 
 
 class _Builder:
@@ -97,12 +109,7 @@ class _Builder:
             sources=tuple(self.sources()),
             parameters=tuple(self.parameters()),
             components=self.losses.components,
-            inputs=usual_inputs(
-                speed=0.0,
-                torque=0.0,
-                T_ambient=gearbox.ambient.temperature_degC,
-                air_speed=gearbox.ambient.air_speed_m_s,
-            ),
+            inputs=gearbox.inputs,
             groups={
                 "housing": self.housing_parts,
                 "bearings": tuple(bearing.name for bearing in gearbox.bearing),

@@ -10,24 +10,21 @@ import numpy as np
 import sympy as sp
 from numpy.typing import ArrayLike
 
-from models.base.errors import InputError, did_you_mean
+from models.assembly.table_builder import TableBuilder
 from models.base.types import Array
-from models.definition.parametric_sections import Heat, Loss, ParametricDefinition, Path, TorqueFromPower
+from models.definition.machine_definition import Path
+from models.definition.parametric_sections import Loss, ParametricDefinition, TorqueFromPower
 from models.formulas.extremes import Max, Min
 from models.formulas.oil import T_HIGHEST, T_LOWEST, kinematic_viscosity_d341
 from models.losses.loss_model import refuse_unphysical
-from models.network.expressions import parse_expression
-from models.network.laws import Parameter, compile_each, symbol
+from models.network.laws import Parameter, symbol
 from models.portable.evaluation import RPM
 from models.quantities.units import find_unit
-from models.simulation.thermal_network import Link, Node, Source, ThermalNetwork
+from models.simulation.thermal_network import Source, ThermalNetwork
 
-GROUPS = ("housing", "bearings", "returns")
 RUN_POWER = 8  # sharpness of the step of a conductance from standstill to running, over speed
 RATIOS = (0.02, 50.0)  # of speed, torque or viscosity, beyond which an exponent's deviation has no further effect
 SLOWEST_RPM = 1.0  # below it a torque from a power is that at it
-FARTHEST = 1000.0  # limits of a factor; its prior keeps it much nearer to 1
-COLD_DEGC = 20.0  # from which to the stated temperature factors on conductances are tried
 
 
 @dataclass(frozen=True)
@@ -131,52 +128,6 @@ def build_parametric_network(definition: ParametricDefinition, priors: Mapping[s
     return _Builder(definition, priors).network()
 
 
-def law_faults(definition: ParametricDefinition) -> list[tuple[str, str]]:
-    """Return laws of a definition that cannot be used, as dotted path and message."""
-    temperatures = [f"T_{part.name}" for part in definition.part] + [f"T_{b.name}" for b in definition.boundary]
-    known = ["time", *definition.inputs, *temperatures, *(parameter.name for parameter in definition.parameter)]
-    known += [] if definition.torque is None else ["torque"]
-    laws = [(f"heat.{i}.heat_W", heat.heat_W) for i, heat in enumerate(definition.heat)]
-    laws += [(f"link.{i}.factor", path.factor) for i, path in enumerate(definition.link) if path.factor is not None]
-    faults = []
-    for path, text in laws:
-        try:
-            law = parse_expression(text)
-        except InputError as error:
-            faults.append((path, str(error)))
-            continue
-        used = sorted(s.name for s in law.free_symbols)
-        unknown = [name for name in used if name not in known]
-        faults += [
-            (path, f"{name!r} is no input and no temperature of this definition{did_you_mean(name, known)}")
-            for name in unknown
-        ]
-        if path.startswith("link.") and not unknown:
-            faults += [(path, fault) for fault in _negative(law, definition)]
-    return faults
-
-
-def _negative(factor: sp.Expr, definition: ParametricDefinition) -> Iterator[str]:
-    """A fault if a factor on a conductance is below 0 at low, middle or high values of what is in it."""
-    speed, torque = definition.operation.speed_rpm, definition.operation.torque_Nm
-    ranges = {"time": (0.0, 1e5), "speed": (0.0, speed), "torque": (0.0, torque)}
-    ranges |= {p.name: (p.start, p.start) for p in definition.parameter}
-    for name, given in definition.inputs.items():
-        if name not in ranges and not given.quantity.is_temperature:
-            ranges[name] = given.quantity.low, given.quantity.high
-    names = sorted(s.name for s in factor.free_symbols)
-    warm = COLD_DEGC, definition.operation.temperature_degC
-    levels = [np.linspace(*ranges.get(name, warm), 3) for name in names]
-    points = [grid.ravel() for grid in np.meshgrid(*(level[np.isfinite(level)] for level in levels))]
-    with np.errstate(all="ignore"):  # what is no real number there is no fault of its sign
-        (values,) = compile_each(names, [factor])(*points)
-    values = np.broadcast_to(np.asarray(values, dtype=float), points[0].shape if points else (1,))
-    if (below := np.flatnonzero(values < 0.0)).size:
-        where = ", ".join(f"{name} = {point[below[0]]:g}" for name, point in zip(names, points, strict=True))
-        at = f" at {where}" if where else ""
-        yield f"is {values[below[0]]:.3g}{at}; a conductance is never negative: keep it above 0, with Max(0, ...)"
-
-
 def with_losses_as_laws(network: ThermalNetwork, definition: ParametricDefinition) -> ThermalNetwork:
     """Return a network of a definition, perhaps corrected, in which each loss is a law of its source.
 
@@ -203,65 +154,43 @@ def with_losses_as_laws(network: ThermalNetwork, definition: ParametricDefinitio
     )
 
 
-class _Builder:
+class _Builder(TableBuilder[ParametricDefinition]):
     """Assembles the network of one definition."""
-
-    def __init__(self, definition: ParametricDefinition, priors: Mapping[str, float]) -> None:
-        self.definition, self.priors = definition, priors
-        self.parameters: list[Parameter] = []
 
     def network(self) -> ThermalNetwork:
         definition = self.definition
-        for index, given in enumerate(definition.parameter):
-            sd = self.priors.get(f"parameter.{index}.start", 0.0) / given.start
-            self.parameters.append(Parameter(
-                name=given.name, unit=given.unit, start=given.start, lower=given.start / FARTHEST,
-                upper=given.start * FARTHEST, sd=sd, description=given.description or given.name.replace("_", " "),
-            ))  # fmt: skip
-        boundaries = [Node(name=b.name, temperature=symbol(b.input)) for b in definition.boundary]
-        parts = [
-            Node(name=part.name, capacity=part.heat_capacity_J_K * self._factor(
-                f"C_{part.name}", f"part.{index}.heat_capacity_J_K", part.heat_capacity_J_K,
-                f"factor on the heat capacity of {part.name}"))
-            for index, part in enumerate(definition.part)
-        ]  # fmt: skip
-        links = [self._link(index, path) for index, path in enumerate(definition.link)]
-        sources = [source for index, loss in enumerate(definition.loss) for source in self._sources(index, loss)]
-        sources += [source for index, heat in enumerate(definition.heat) for source in self._heats(index, heat)]
+        nodes, links = (*self.boundaries(), *self.parts()), self.links()
+        losses = [source for index, loss in enumerate(definition.loss) for source in self._sources(index, loss)]
+        sources = (*losses, *self.heats())
         derived = {} if definition.torque is None else {"torque": self._torque(definition.torque)}
         return ThermalNetwork(
-            nodes=(*boundaries, *parts),
-            links=tuple(links),
-            sources=tuple(sources),
+            nodes=nodes,
+            links=links,
+            sources=sources,
             parameters=tuple(self.parameters),
             components=ParametricLosses(definition).components,
             inputs=definition.inputs,
             derived=derived,
-            groups={g: names for g in GROUPS if (names := tuple(p.name for p in definition.part if p.group == g))},
+            groups=self.groups(),
             recording=definition.recording,
         )
 
-    def _link(self, index: int, path: Path) -> Link:
-        a, b = path.between
-        name = f"{a}_{b}"
-        G = path.conductance_W_K * self._factor(
-            f"G_{name}", f"link.{index}.conductance_W_K", path.conductance_W_K, f"factor on the conductance {a} - {b}"
-        )
-        if path.standstill_share < 1.0:
-            share = path.standstill_share * self._factor(
-                f"standstill_{name}", f"link.{index}.standstill_share", path.standstill_share,
-                f"factor on the share of the conductance {a} - {b} at standstill", highest=1.0 / path.standstill_share,
-            )  # fmt: skip
-            speed = sp.Abs(symbol("speed")) / self.definition.operation.running_rpm
-            running = speed**RUN_POWER / (1 + speed**RUN_POWER)
-            G = G * (share + (1 - share) * running)
-        if path.factor is not None:
-            G = G * parse_expression(path.factor)
-        return Link(name=f"{a}-{b}", nodes=(a, b), conductance=sp.sympify(G))
+    def conductance(self, index: int, path: Path) -> sp.Expr:
+        """Conductance of a path before its `factor`, [W/K]; at rest its `standstill_share`."""
+        whole, (a, b) = super().conductance(index, path), path.between
+        if path.standstill_share >= 1.0:
+            return whole
+        share = path.standstill_share * self.factor(
+            f"standstill_{a}_{b}", f"link.{index}.standstill_share", path.standstill_share,
+            f"factor on the share of the conductance {a} - {b} at standstill", highest=1.0 / path.standstill_share,
+        )  # fmt: skip
+        speed = sp.Abs(symbol("speed")) / self.definition.operation.running_rpm
+        running = speed**RUN_POWER / (1 + speed**RUN_POWER)
+        return whole * (share + (1 - share) * running)
 
     def _torque(self, given: TorqueFromPower) -> sp.Expr:
         """Torque [N m] as power over angular speed, times the efficiency between the two places of measurement."""
-        efficiency = given.efficiency * self._factor(
+        efficiency = given.efficiency * self.factor(
             "efficiency",
             "torque.efficiency",
             given.efficiency,
@@ -271,15 +200,6 @@ class _Builder:
         omega = Max(sp.Abs(symbol("speed")), SLOWEST_RPM) * RPM
         return efficiency * unit.factor * symbol(given.power) / omega
 
-    def _heats(self, index: int, heat: Heat) -> Iterator[Source]:
-        gain = heat.gain * self._factor(
-            f"{heat.name}_gain", f"heat.{index}.gain", heat.gain, f"factor on the heat {heat.name}"
-        )
-        law = gain * parse_expression(heat.heat_W) / len(heat.parts)
-        for part in heat.parts:
-            name = heat.name if len(heat.parts) == 1 else f"{heat.name}_{part}"
-            yield Source(name=name, node=part, heat=sp.sympify(law), is_loss=False)
-
     def _sources(self, index: int, loss: Loss) -> Iterator[Source]:
         path = f"loss.{index}"
         n, m, nu = _ratios(self.definition, loss)
@@ -287,20 +207,11 @@ class _Builder:
         sizes = {"no_load": (loss.no_load_W, "no-load"), "load": (loss.load_W, "load-dependent")}
         for kind in kinds_of(loss):
             name, (size, text) = f"{loss.name}_{kind}", sizes[kind]
-            law = self._factor(name, f"{path}.{kind}_W", size, f"factor on the {text} loss {loss.name}")
+            law = self.factor(name, f"{path}.{kind}_W", size, f"factor on the {text} loss {loss.name}")
             for of, ratio in tilts[kind]:
                 law *= self._tilt(f"{loss.name}_{of}_exponent", f"{path}.{of}_exponent", ratio)
             # The loss as assumed, times what a recording made of it; its name is the parameter's, so apart from it.
             yield Source(name=name, node=loss.part, heat=symbol(f"P_{name}") * law, is_loss=True)
-
-    def _factor(self, name: str, path: str, value: float, description: str, *, highest: float = FARTHEST) -> sp.Expr:
-        sd = self.priors.get(path, 0.0)
-        if sd <= 0.0 or value == 0.0:
-            return sp.Integer(1)
-        self.parameters.append(Parameter(
-            name=name, start=1.0, lower=1.0 / FARTHEST, upper=highest, sd=sd / abs(value), description=description,
-        ))  # fmt: skip
-        return symbol(name)
 
     def _tilt(self, name: str, path: str, ratio: sp.Expr) -> sp.Expr:
         """``ratio ** deviation`` of an uncertain exponent."""

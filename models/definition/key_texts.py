@@ -1,6 +1,7 @@
 """Meaning and typical size of every key of a definition, for the schema, the commented files, and the reference.
 
-Texts are by class of :mod:`models.definition.sections` and :mod:`models.definition.parametric_sections`, then by key.
+Texts are by class of :mod:`models.definition.sections`, :mod:`models.definition.machine_definition` and
+:mod:`models.definition.parametric_sections`, then by key.
 Units and limits stand in the classes. A typical range is judgement for industrial gearboxes of 1 kW to 1 MW, and limits
 nothing.
 """
@@ -19,15 +20,23 @@ class KeyText:
     typical: str = ""
 
 
-def _texts(**keys: str | tuple[str, str]) -> Mapping[str, KeyText]:
+def _texts(**keys: str | tuple[str, str]) -> dict[str, KeyText]:
     return {key: KeyText(text) if isinstance(text, str) else KeyText(*text) for key, text in keys.items()}
 
 
-DESIGN = "Name of this machine, for people"
+MACHINE = _texts(
+    schema="Version of this kind of file; always 1",
+    name="Name of this machine, for people",
+    input="Signals that recordings, cycles and hosts of the FMU give; laws use them by name",
+    parameter="Numbers that several laws share; with an sd they are calibrated",
+    boundary="Surroundings of a recorded temperature",
+    part="Parts of one temperature each; with geometry those that are added to it, such as a bed",
+    link="Heat paths; with geometry those that are added to it",
+    heat="Heat by a law",
+    recording="What the columns of this machine's recordings mean, as in a mapping file",
+)
 TEXTS: Mapping[str, Mapping[str, KeyText]] = {
-    "Definition": _texts(
-        schema="Version of this kind of file; always 1",
-        name=DESIGN,
+    "Definition": MACHINE | _texts(
         ambient="The surroundings where a cycle or a recording names none",
         oil="The filling",
         shaft="One shaft more than stages; the first one that drives is the input of the model",
@@ -208,21 +217,12 @@ TEXTS: Mapping[str, Mapping[str, KeyText]] = {
         torque_Nm=("Lowest and highest torque at the input shaft, by size", "[1, 500]"),
         temperature_degC=("Lowest and highest temperature of any part", "[-20, 150]"),
     ),
-    "ParametricDefinition": _texts(
-        schema="Version of this kind of file; always 1",
-        name=DESIGN,
+    "ParametricDefinition": MACHINE | _texts(
         reference="Where the losses are stated, and the speed between standing and running",
         ambient="The air where a recording names none",
         oil="Two points of the oil's viscosity, known or assumed",
-        input="Signals that recordings, cycles and hosts of the FMU give; laws use them by name",
-        parameter="Numbers that several laws share; with an sd they are calibrated",
         torque="Torque from a measured power",
-        boundary="Surroundings of a recorded temperature",
-        part="Parts of one temperature each",
-        link="Heat paths",
-        heat="Heat by a law",
         loss="Losses by powers of speed, torque and viscosity",
-        recording="What the columns of this machine's recordings mean, as in a mapping file",
     ),
     "Reference": _texts(
         speed_rpm=("Speed of the input shaft", "500 to 3000"),
@@ -255,9 +255,9 @@ TEXTS: Mapping[str, Mapping[str, KeyText]] = {
         group="What mechanisms take it for: housing, bearings, or returns of the oil",
     ),
     "Path": _texts(
-        between="Two parts, or a part and a boundary",
+        between="Two parts, or a part and a boundary; with geometry any of its nodes too",
         conductance_W_K=("Conductance: heat per kelvin", "0.1 to 1000"),
-        standstill_share=("Share of it that is left when the gearbox stands", "0.1 to 1"),
+        standstill_share=("Share of it that is left when the gearbox stands; without geometry", "0.1 to 1"),
         factor='Law without unit on the conductance, of inputs and temperatures, such as "oil_flow / 20"',
     ),
     "Heat": _texts(

@@ -13,6 +13,7 @@ from models.definition.bearing_section import Bearing
 from models.definition.sections import Shaft
 from models.formulas.geometry import GearPair
 
+ADDED = ("input", "boundary", "part", "link", "heat")  # tables that plants do not know
 T_SERVICE = 60.0  # degC, where the properties of the oil are taken that plants hold constant
 
 
@@ -25,6 +26,11 @@ def refuse_unbuilt(gearbox: Gearbox) -> None:
         )
     if any(bearing.load_share is None for bearing in gearbox.bearing):
         raise InputError(f"{gearbox.file}: has bearings with position_mm; concealed cases need their load_share")
+    if added := [key for key in ADDED if getattr(gearbox.geometry, key)]:
+        raise InputError(
+            f"{gearbox.file}: has [[{']], [['.join(added)}]]; plants are made of teeth, shafts, bearings and housing "
+            "alone: leave these tables out"
+        )
 
 
 @dataclass(frozen=True)

@@ -43,6 +43,15 @@ def test_a_bar_does_not_end_a_cell(generate: ModuleType) -> None:
     assert list(generate._table(("a", "b"), [("x|y", "")])) == ["| a |", "| --- |", r"| x\|y |", ""]
 
 
+def test_tables_of_both_kinds_of_definition_are_written_once(generate: ModuleType) -> None:
+    kinds = (generate.definition, generate.definition_of_both, generate.definition_without_geometry)
+    titles = [[line for line in kind() if line.startswith("### ")] for kind in kinds]
+    assert "### `[[link]]`" in titles[1] and "### `[[stage]]`" in titles[0] and "### `[[loss]]`" in titles[2]
+    assert set(titles[1]) & {*titles[0], *titles[2]} == {"### At the top of the file"}
+    assert any(line.startswith("| `factors` |") for line in generate.definition())
+    assert any(line.startswith("| `schema` |") for line in generate.definition_of_both())
+
+
 @pytest.mark.parametrize("name", ["correction", "mapping", "network", "oils", "bearings", "variables"])
 def test_pages_are_not_empty(generate: ModuleType, name: str) -> None:
     assert len("\n".join(generate.GENERATORS[name]())) > 100

@@ -20,7 +20,8 @@ from diagnosis.proof.zoo.structure import Law, Moment, ZooPlant, constant, times
 from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError
 from models.base.types import Array
-from models.definition.parametric_sections import Loss, ParametricDefinition, Path
+from models.definition.machine_definition import Path
+from models.definition.parametric_sections import Loss, ParametricDefinition
 from models.formulas.oil import kinematic_viscosity_d341
 from models.network.expressions import parse_expression
 

@@ -9,12 +9,15 @@ from typing import Any
 import jsonschema
 import pytest
 
+from models.assembly import commented_definition as module
 from models.assembly.commented_definition import commented_definition
 from models.assembly.definition_schema import ROOTS, definition_schema, table_classes
 from models.assembly.gearbox import known_gearboxes, load_gearbox, read_gearbox
 from models.definition.definition_file import OIL_OF_SEAL
 from models.definition.key_texts import TEXTS
 from models.files.toml_file import packaged, read_text
+from tests.unit.models.around_fzg import TABLES, around_fzg
+from tests.unit.models.fzg_file import FZG
 
 ROOT = Path(__file__).parents[4]
 VALIDATOR = jsonschema.Draft7Validator(definition_schema())
@@ -32,6 +35,11 @@ def test_the_machines_of_the_package_fit(name: str) -> None:
 
 def test_an_example_fits() -> None:
     assert faults((ROOT / "examples/room.toml").read_text(encoding="utf-8")) == []
+
+
+def test_a_geometry_with_its_surroundings_fits() -> None:
+    assert faults(FZG + TABLES) == []
+    assert "link.0" in faults(FZG + TABLES.replace("conductance_W_K = { value", "conductance = { value", 1))
 
 
 @pytest.mark.parametrize(
@@ -57,7 +65,7 @@ def test_a_fault_is_found_where_it_is(old: str, new: str, place: str) -> None:
 @pytest.mark.parametrize(
     ("name", "more", "place"),
     [
-        ("fzg", '[[heat]]\nname = "x"\npart = "oil"\nheat_W = "1"', "heat"),
+        ("fzg", '[[loss]]\nname = "x"\npart = "oil"\nno_load_W = 1.0\nload_W = 1.0', "loss"),
         ("heated_rod", "[housing]\nheight_m = 0.2", "housing"),
         ("la_haute_borne", "[oil.gold]\ns = 1.0", "oil"),
         ("fzg", "[[stages]]\nz = [1, 2]", ""),
@@ -97,6 +105,15 @@ def test_a_commented_definition_is_the_machine_that_it_began_from(like: str) -> 
     assert own.priors == begun_from.priors
     assert faults(text) == []
     assert text.startswith("#:schema definition.schema.json\n")
+
+
+def test_a_commented_definition_keeps_and_explains_surroundings(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "read_text", lambda _: FZG + TABLES)
+    text = commented_definition("fzg", name="mine", file="mine.toml", schema="definition.schema.json")
+    own, around = read_gearbox(text, file="mine.toml"), around_fzg()
+    assert own.network().node_names == around.network().node_names and own.priors == around.priors
+    assert [one.conductance_W_K for one in own.definition.link] == [12.0, 60.0, 15.0, 2.0]
+    assert "# Heat by a law.\n[[heat]]\n# Name of the heat.\n" in text and "\n# gain = 1.0\n" in text
 
 
 def test_a_default_that_a_comment_shows_can_be_uncommented() -> None:
