@@ -58,7 +58,7 @@ def _steady(gearbox: Gearbox) -> Grid:
     parts = ["oil", *(part.name for part in gearbox.housing.part)]
     rows: list[list[str]] = [[name] for name in [*parts, "hottest bearing"]]
     for _, share in SHARES:
-        speed, torque = (share * value for value in _largest(gearbox))
+        speed, torque, _ = (share * value for value in gearbox.definition.full_operation)
         try:
             T = gearbox.steady_state(speed=speed, torque=torque).temperatures
         except ArithmeticError:
