@@ -4,8 +4,8 @@ A pattern is a name, a group (its members together), or ``each`` and a group (on
 
 - source, link: nodes. ``oil``, ``housing``, ``each bearings``, ``each parts`` (of all there are); of a link also both
   ends, ``each bearings-returns``, the other one a boundary or a group of one
-- loss_factor: sources. ``losses``, all that are mechanical; ``mesh_sliding``, that of all stages, which are numbered
-  where there are several; the losses in a group of nodes,
+- loss_factor: sources. ``losses``, all that are mechanical; ``mesh_sliding``, where there are several stages that of
+  all, and that of each; the losses in a group of nodes,
   ``each bearings``; those in the nodes of a group that hang on one member of another, ``each shafts>bearings``; those
   that a factor of the network multiplies, ``factor seal``; several together, ``mesh_sliding+mesh_rolling``; with
   links that change with them, ``churning+oil-gears``
@@ -25,7 +25,7 @@ from itertools import combinations
 
 from models.network.laws import symbol
 from models.quantities.quantities import node_of_channel
-from models.simulation.thermal_network import ThermalNetwork
+from models.simulation.thermal_network import Source, ThermalNetwork
 from models.terms.term import Kind
 
 EACH, FACTOR, ALL_LOSSES, ALL_PARTS = "each ", "factor ", "losses", "parts"
@@ -142,6 +142,13 @@ def _sources(network: ThermalNetwork, pattern: str) -> Iterator[Placement]:
         name = "_".join(identifier(name.removeprefix(FACTOR)) for name in rest.split("+"))
         nodes = tuple(dict.fromkeys(source.node for source in chosen))
         yield Placement(name=name, target=(*(source.name for source in chosen), *links), here=nodes)
+        stages: dict[str, list[Source]] = {}
+        for source in chosen:
+            if not links and source.name not in wanted and STAGE_NUMBER.sub("", source.name) in wanted:
+                stages.setdefault(source.name[source.name.rindex("_") :], []).append(source)
+        for number, own in stages.items():
+            here = tuple(dict.fromkeys(source.node for source in own))
+            yield Placement(name=name + number, target=tuple(source.name for source in own), here=here)
 
 
 def _held(network: ThermalNetwork, holder: str, held: str) -> Iterator[Placement]:

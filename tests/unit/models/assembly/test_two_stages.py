@@ -11,6 +11,7 @@ from builder.surrogate.networks import PRESETS, network_specs
 from models.assembly.gearbox import load_gearbox, read_gearbox
 from models.base.errors import InputError
 from models.files.toml_file import packaged, read_text
+from models.mechanisms.places import placements
 
 TEXT = read_text(packaged("gearboxes", "two_stage"))
 TWO = load_gearbox("two_stage")
@@ -164,3 +165,16 @@ def test_every_mesh_has_its_own_network_and_seals_and_churning_share_one() -> No
 )  # fmt: skip
 def test_a_fault_of_the_chain_is_named(changes: tuple[tuple[str, str], ...], words: str) -> None:
     assert words in message_about(*changes)
+
+
+def test_a_fault_of_the_losses_may_be_in_one_stage_or_in_both() -> None:
+    network = TWO.network()
+    found = {one.name: one.target for one in placements(network, "loss_factor", "mesh_sliding", ())}
+    both = ("mesh_sliding_1", "mesh_sliding_2")
+    assert found == {"mesh_sliding": both, "mesh_sliding_1": both[:1], "mesh_sliding_2": both[1:]}
+    # What changes with links is one place: which gears are whose stage's the name of a loss does not say.
+    (leak,) = placements(network, "loss_factor", "churning+oil-gears", ())
+    assert leak.target[:2] == ("churning_1", "churning_2") and len(leak.target) == 6
+    assert [one.name for one in placements(network, "source", "mesh", ())] == ["mesh"]
+    (every,) = placements(network, "loss_factor", "losses", ())
+    assert len(every.target) == 14
