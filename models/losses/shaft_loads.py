@@ -66,6 +66,15 @@ def bearing_loads(gearbox: GearboxData) -> dict[str, BearingLoad]:
     circle. Where a shaft has two gears, the forces add as vectors; the angle between them is that of the centre lines,
     ``angle_deg``, less both working pressure angles.
 
+    Parameters
+    ----------
+    gearbox : GearboxData
+
+    Returns
+    -------
+    dict of str to BearingLoad
+        Root mean squares over both senses of the torque and both hands of the helix
+
     References
     ----------
     Balance of forces and moments, as in every textbook of machine elements.
