@@ -34,6 +34,7 @@ TOTAL, TOTAL_COLOUR = "total", "black"
 SIZE = (8.0, 4.0)  # inches of new axes
 LABELS = {"temperatures": "Temperature in °C", "losses": "Power loss in W"}
 LONG_S = 7200.0  # longer times are in hours
+OF_STAGES = ("sliding", "rolling", "churning")  # ends of losses that every stage has; their sum has the name of one
 Curves = dict[str, tuple[Array, tuple[str, ...]]]  # by label: values, and the columns that they are the sum of
 
 
@@ -126,7 +127,8 @@ def loss_curves(columns: Mapping[str, Array], only: Sequence[str] = ()) -> Curve
     gathered: dict[str, tuple[str, ...]] = {TOTAL: ("P_loss_W",)} if "P_loss_W" in columns else {}
     for component in members(columns, "losses"):
         stem, _, number = component.rpartition("_")
-        label = f"{stem}s" if number.isdigit() and component not in only else component
+        plural = stem if stem.endswith(OF_STAGES) else f"{stem}s"
+        label = plural if number.isdigit() and component not in only else component
         gathered[label] = (*gathered.get(label, ()), f"P_loss_{component}_W")
     curves: Curves = {
         label: (np.sum([columns[n] for n in names], axis=0), names) for label, names in gathered.items()

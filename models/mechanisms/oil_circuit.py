@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import sympy as sp
@@ -47,6 +48,10 @@ def _set_point(scale: Scale) -> Parameter:
     return temperature("set_point", share_between(scale, 0.75), sd=15.0, grid=grid)
 
 
+def _opens(scale: Scale) -> Parameter:
+    return replace(_set_point(scale), description="where it begins to open; a band further it is wide open")
+
+
 def _band() -> Parameter:
     return positive("band", 6.0, sd=0.5, unit="K", grid=(3.0, 8.0))
 
@@ -83,7 +88,7 @@ cooler_proportional = Mechanism(
     other_temperature=lambda s: s.coolant,
     parameters=lambda scale: (
         _cooler(scale),
-        _set_point(scale),
+        _opens(scale),
         positive("band", 10.0, sd=0.6, unit="K", grid=(5.0, 15.0)),
         _coolant(scale),
     ),
@@ -206,7 +211,7 @@ heater_thermostat = Mechanism(
             "set_point",
             share_between(scale, 0.3),
             sd=12.0,
-            grid=[share_between(scale, share) for share in (0.4, 0.1, 0.2, 0.3, 0.5, 0.7)],
+            grid=[share_between(scale, share) for share in (0.4, 0.1, 0.2, 0.3, 0.5, 0.7, 0.85, 1.0)],
         ),
         _band(),
         plain("running", 0.5, sd=0.5, lower=0.0, upper=1.0, grid=(1.0, 0.0)),
@@ -279,7 +284,7 @@ cooler_air_proportional = Mechanism(
     places=("returns-air", "returns-outdoor"),
     parameters=lambda scale: (
         strength(1.5 * scale.conductance, "W/K", "conductance of the cooler, wide open"),
-        _set_point(scale),
+        _opens(scale),
         positive("band", 10.0, sd=0.6, unit="K", grid=(5.0, 15.0)),
     ),
     law=lambda s: s.strength * Min(Max((s.T_oil - s.set_point) / s.band, 0.0), 1.0),

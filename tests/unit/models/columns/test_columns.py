@@ -12,6 +12,7 @@ from matplotlib import pyplot as plt
 
 from models.base.errors import InputError
 from models.columns.columns import Columns
+from models.columns.curves import loss_curves
 from models.quantities.part_colours import part_colours
 
 TIME = np.array([0.0, 3600.0, 10800.0])
@@ -71,3 +72,12 @@ def test_what_cannot_be_drawn(what: Any, only: Any, message: str) -> None:
 def test_parts_of_other_families_do_not_have_the_colour_of_a_known_one() -> None:
     colours = part_colours(["oil", "case", "pinion", "in_a", "flange", "bearing_1"])
     assert len(set(colours.values())) == len(colours)
+
+
+def test_losses_of_several_stages_are_one_curve() -> None:
+    names = ("mesh_sliding_1", "mesh_sliding_2", "churning_1", "churning_2", "bearing_1", "bearing_2")
+    columns = {"P_loss_W": np.full(2, 21.0)} | {f"P_loss_{n}_W": np.full(2, float(i)) for i, n in enumerate(names, 1)}
+    curves = loss_curves(columns)
+    assert {label: values.tolist() for label, (values, _) in curves.items()} == {
+        "total": [21.0, 21.0], "mesh_sliding": [3.0, 3.0], "churning": [7.0, 7.0], "bearings": [11.0, 11.0],
+    }  # fmt: skip
