@@ -211,7 +211,7 @@ heater_thermostat = Mechanism(
             "set_point",
             share_between(scale, 0.3),
             sd=12.0,
-            grid=[share_between(scale, share) for share in (0.4, 0.1, 0.2, 0.3, 0.5, 0.7, 0.85, 1.0)],
+            grid=[share_between(scale, share) for share in (0.4, 0.1, 0.25, 0.55, 0.75, 0.95)],
         ),
         _band(),
         plain("running", 0.5, sd=0.5, lower=0.0, upper=1.0, grid=(1.0, 0.0)),
