@@ -52,6 +52,11 @@ def known_finding(
         elif not p.lower <= value <= p.upper:
             limits = f"{p.lower:.4g} to {p.upper:.4g}{behind_a_number(p.unit)}"
             raise InputError(f"{key} = {value:g} is outside {limits} of {name}")
+    read = {s.name for law in term.laws.values() for s in law.free_symbols}
+    for key in given:
+        if own[key].name not in read:
+            raise InputError(f"{key} of {name} has no effect: {gearbox.file} has surroundings of this name, whose "
+                             "temperature counts; leave it out")  # fmt: skip
     strength = term.strength
     if _local(term, strength) not in given:
         raise InputError(f"the strength of {name} is missing: {strength.description or 'its size'} [{strength.unit}], "

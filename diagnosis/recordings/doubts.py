@@ -24,6 +24,7 @@ FAR_TIMES = 10.0  # which others exceed so many times that they may be codes of 
 CODES, CODE_TIMES = (999.0, 9999.0, 99999.0, 32767.0, 32768.0, 65535.0), 1.5  # of loggers; beyond what is usual
 FAHRENHEIT_K, NEARER = 15.0, 4.0  # above the others at least, if from -20 degC on; times nearer once it is converted
 COLDER_K = 3.0  # below the ambient air on average
+FAR_SDS = 4.0  # of a stated tolerance, from which a start is odd all the same
 LEAST_LOSS, MOST_LOSS = 1e-3, 5.0  # of the power, on average; without load all of the power, and more, is lost
 BRIEF_S, WARMED_K = 300.0, 15.0  # no gearbox warms that fast
 MILLISECONDS = (100.0, 200.0, 500.0, 1000.0, 2000.0)  # s from row to row that are more likely so many milliseconds
@@ -110,11 +111,15 @@ def _off_when_cold(found: RecordedRows, network: RecordedMachine) -> Iterator[st
         return
     middle = float(np.median([*firsts.values()]))
     for quantity, first in firsts.items():
-        if abs(first - middle) > AGREE_K and found.roles[quantity].bias_sd is None:
+        stated = found.roles[quantity].bias_sd
+        if abs(first - middle) > max(AGREE_K, FAR_SDS * (stated or 0.0)):
+            advice = (
+                "if it is wrong, state its tolerance in a mapping (bias_sd)" if stated is None else
+                f"that is far more than its tolerance, a bias_sd of {stated:g} K"
+            )  # fmt: skip
             yield (
                 f"{found.names[quantity]} begins {abs(first - middle):.1f} K {'above' if first > middle else 'below'} "
-                "the other thermometers, which agree as in a machine that has stood still: if it is wrong, state its "
-                "tolerance in a mapping (bias_sd)"
+                f"the other thermometers, which agree as in a machine that has stood still: {advice}"
             )
 
 

@@ -14,6 +14,8 @@ from models.assembly.gearbox import Gearbox
 from models.correction.correction import read_correction
 from models.network.laws import symbol
 from tests.conftest import RunCli
+from tests.unit.models.around_fzg import TABLES
+from tests.unit.models.fzg_file import FZG
 
 FAN = ("fan_thermostat", "--set", "strength=7", "--set", "set_point=55:2")
 
@@ -108,3 +110,13 @@ def test_a_warm_coolant_that_is_known_is_no_guess(
     file.unlink()
     assert run_cli("add", file, "cooler_constant", "--set", "strength=60", "--set", "coolant=338") == 2
     assert "coolant = 338 is outside -3 to 47 degC" in capsys.readouterr().err
+
+
+def test_a_coolant_that_the_definition_has_is_not_given_a_second_time(
+    tmp_path: Path, file: Path, run_cli: RunCli, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "around.toml").write_text(FZG + TABLES, encoding="utf-8")
+    cooler = ("add", file, "cooler_constant", "--gearbox", tmp_path / "around.toml", "--set", "strength=60")
+    assert run_cli(*cooler, "--set", "coolant=30") == 2
+    assert "coolant of cooler_constant has no effect: " in capsys.readouterr().err and not file.exists()
+    assert run_cli(*cooler) == 0

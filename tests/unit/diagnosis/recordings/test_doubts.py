@@ -82,3 +82,11 @@ def test_a_tolerance_that_is_stated_is_not_asked_for(tmp_path: Path, fzg: Gearbo
     column = '[columns.T_bearing_2_degC]\nquantity = "T_bearing_2"\nbias_sd = 3.0\n'
     (tmp_path / "run.toml").write_text(f"schema = 1\n{column}", encoding="utf-8")
     assert all("bias_sd" not in note for note in notes(tmp_path, fzg, with_thermometer(25.0)))
+
+
+def test_a_start_far_beyond_the_stated_tolerance_is_a_doubt(tmp_path: Path, fzg: Gearbox) -> None:
+    column = '[columns.T_bearing_2_degC]\nquantity = "T_bearing_2"\nbias_sd = 0.2\n'
+    (tmp_path / "run.toml").write_text(f"schema = 1\n{column}", encoding="utf-8")
+    first = notes(tmp_path, fzg, with_thermometer(25.0))[0]
+    assert "T_bearing_2_degC begins 2.5 K above the other thermometers" in first
+    assert "far more than its tolerance, a bias_sd of 0.2 K" in first
