@@ -116,9 +116,8 @@ def _radial(bearing: Bearing, bearings: list[Bearing], meshes: list[_Mesh]) -> f
     if bearing.load_share is not None:
         shares, couples = [bearing.load_share * mesh.force for mesh in meshes], [0.0 for _ in meshes]
     else:
-        here, there = (
-            1e-3 * float(one.position_mm or 0.0) for one in sorted(bearings, key=lambda b: b.name != bearing.name)
-        )
+        other = next(one for one in bearings if one.name != bearing.name)
+        here, there = (1e-3 * float(one.position_mm or 0.0) for one in (bearing, other))
         shares = [mesh.force * (there - float(mesh.position or 0.0)) / (there - here) for mesh in meshes]
         couples = [mesh.force * mesh.tilt * mesh.r_w / (there - here) for mesh in meshes]
     square = sum(share * share for share in shares) + sum(couple * couple for couple in couples)
