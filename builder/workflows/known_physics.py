@@ -47,11 +47,13 @@ def known_finding(
         if key not in own:
             raise InputError(f"{name} has no parameter {key!r}{did_you_mean(key, own)}; it has {', '.join(own)}")
         p = own[key]
-        if p.unit == "degC" and COLDEST_KNOWN <= value <= HOTTEST_KNOWN:  # limits are those of a guess
-            own[key] = replace(p, lower=min(p.lower, value), upper=max(p.upper, value))
-        elif not p.lower <= value <= p.upper:
-            limits = f"{p.lower:.4g} to {p.upper:.4g}{behind_a_number(p.unit)}"
+        low, high = p.lower, p.upper
+        if p.unit == "degC":  # the limits of a search are narrower
+            low, high = min(low, COLDEST_KNOWN), max(high, HOTTEST_KNOWN)
+        if not low <= value <= high:
+            limits = f"{low:.4g} to {high:.4g}{behind_a_number(p.unit)}"
             raise InputError(f"{key} = {value:g} is outside {limits} of {name}")
+        own[key] = replace(p, lower=min(p.lower, value), upper=max(p.upper, value))
     read = {s.name for law in term.laws.values() for s in law.free_symbols}
     for key in given:
         if own[key].name not in read:

@@ -75,7 +75,7 @@ def _gears(gearbox: Gearbox) -> Iterator[Grid]:
     geometry = gearbox.geometry
     _, torque, _ = geometry.full_operation
     for number, stage in enumerate(gearbox.stage, start=1):
-        pair, levels = stage.pair(), [geometry.level_below_axis[shaft] for shaft in (stage.driver, stage.driven)]
+        pair, levels = stage.pair(), [geometry.level_below_axis[shaft] for shaft in stage.shafts]
         rows = [
             [name, f"{2e3 * r_a:.1f}", f"{1e3 * (r_a - level):.1f}" if r_a > level else "not at all"]
             for name, r_a, level in zip(stage.names, pair.r_a, levels, strict=True)

@@ -284,7 +284,7 @@ def _positions(definition: Definition, shaft: str, bearings: list[Bearing]) -> I
             "one, give each a load_share"
         )
     for number, stage in enumerate(definition.stage, start=1):
-        if shaft in (stage.driver, stage.driven) and stage.position_mm is None:
+        if shaft in stage.shafts and stage.position_mm is None:
             yield f"stage #{number}.position_mm is missing; the bearings of '{shaft}' have position_mm"
 
 
@@ -301,7 +301,7 @@ def _taper_pairs(definition: Definition) -> Iterator[str]:
 def _axial_loads(definition: Definition) -> Iterator[str]:
     """Refuse shafts of helical gears whose axial force no bearing can take, or several would."""
     for shaft in definition.shaft:
-        angle = max(s.helix_angle_deg for s in definition.stage if shaft.name in (s.driver, s.driven))
+        angle = max(s.helix_angle_deg for s in definition.stage if shaft.name in s.shafts)
         if angle == 0.0:
             continue
         locating = [bearing for bearing in definition.bearing if bearing.shaft == shaft.name and bearing.locating]
@@ -319,7 +319,7 @@ def _shafts_in_gears(definition: Definition) -> Iterator[str]:
     """Refuse shafts that are thicker than the gears on them."""
     diameters = {shaft.name: shaft.diameter_mm for shaft in definition.shaft}
     for stage in definition.stage:
-        for shaft, gear, r_f in zip((stage.driver, stage.driven), stage.names, stage.pair().r_f, strict=True):
+        for shaft, gear, r_f in zip(stage.shafts, stage.names, stage.pair().r_f, strict=True):
             if diameters[shaft] >= 2e3 * r_f:
                 yield (
                     f"shaft '{shaft}'.diameter_mm: {diameters[shaft]:g} mm is not below the root diameter "
@@ -371,7 +371,7 @@ def _oil_level(definition: Definition) -> Iterator[str]:
     rooms = [
         (1e3 * definition.level_below_axis[shaft] - level, height - 1e3 * r_a)
         for stage in definition.stage
-        for shaft, r_a in zip((stage.driver, stage.driven), stage.pair().r_a, strict=True)
+        for shaft, r_a in zip(stage.shafts, stage.pair().r_a, strict=True)
     ]
     low, high = max(-room - lift for lift, room in rooms), min(room - lift for lift, room in rooms)
     if not low <= level <= high:

@@ -323,5 +323,5 @@ class _Gear:
 def _gears(gearbox: Definition) -> Iterator[_Gear]:
     for stage in gearbox.stage:
         pair = stage.pair()
-        for index, (name, shaft) in enumerate(zip(stage.names, (stage.driver, stage.driven), strict=True)):
+        for index, (name, shaft) in enumerate(zip(stage.names, stage.shafts, strict=True)):
             yield _Gear(name=name, shaft=shaft, stage=stage, pair=pair, index=index)

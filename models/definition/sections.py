@@ -303,6 +303,11 @@ class Stage(Section):
     roughness_Ra = InSI[tuple[float, float]]("roughness_Ra_um")
 
     @property
+    def shafts(self) -> tuple[str, str]:
+        """Names of the driving and the driven shaft."""
+        return self.driver, self.driven
+
+    @property
     def bore_radius(self) -> tuple[float, float]:
         """Radii of the gear bores, for the compliance of the gear bodies, [m]."""
         return 0.5e-3 * self.bore_mm[0], 0.5e-3 * self.bore_mm[1]

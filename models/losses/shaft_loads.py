@@ -101,8 +101,8 @@ def _meshes(gearbox: GearboxData, shaft: str) -> Iterator[_Mesh]:
     """Meshes of a shaft in the order of the stages: at most one that drives it, and one that it drives."""
     first = None
     for stage in gearbox.stage:
-        if shaft in (stage.driver, stage.driven):
-            gear, pair = (stage.driver, stage.driven).index(shaft), stage.pair()
+        if shaft in stage.shafts:
+            gear, pair = stage.shafts.index(shaft), stage.pair()
             force = gearbox.torque_ratio[stage.driver] / pair.r_b[0]
             first = force if first is None else first
             yield _Mesh(

@@ -357,6 +357,18 @@ def test_no_place_in_a_network_without_the_part() -> None:
     assert placed("run_in_seals") and not CATALOGUE["run_in_seals"].placed(bare, SCALES["fzg"])
 
 
+def test_heaters_and_coolers_of_hot_oil_are_both_looked_for() -> None:
+    """Else the one with the same two thresholds takes the place of the other."""
+    grids = {}
+    for name in ("heater_thermostat", "cooler_thermostat"):
+        (term,) = placed(name)
+        (set_point,) = (p for p in term.parameters if p.name.endswith("set_point"))
+        grids[name] = [(T - term.scale.ambient) / (term.scale.temperature - term.scale.ambient) for T in set_point.grid]
+    heater, cooler = grids.values()
+    assert min(heater) < 0.15 and max(heater) == pytest.approx(1.0) and max(cooler) >= 1.0
+    assert max(np.diff(sorted(heater))) < 0.21
+
+
 def test_fans_follow_the_speed() -> None:
     """On the shaft by the power law, by a switch within a tenth of its speed; backwards as forwards, none at rest."""
     reference = SCALES["fzg"].speed

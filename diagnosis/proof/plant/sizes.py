@@ -69,7 +69,7 @@ class BoxSizes:
     @property
     def shafts(self) -> tuple[str, str]:
         """Names of the driving and the driven shaft."""
-        return self.gearbox.stage[0].driver, self.gearbox.stage[0].driven
+        return self.gearbox.stage[0].shafts
 
     def shaft(self, name: str) -> Shaft:
         """Section of a shaft."""

@@ -109,7 +109,7 @@ def test_a_warm_coolant_that_is_known_is_no_guess(
     assert fzg.steady_state(network=network).temperatures["oil"] > 35.0  # at rest in air of 27 degC
     file.unlink()
     assert run_cli("add", file, "cooler_constant", "--set", "strength=60", "--set", "coolant=338") == 2
-    assert "coolant = 338 is outside -3 to 47 degC" in capsys.readouterr().err
+    assert "coolant = 338 is outside -60 to 150 degC" in capsys.readouterr().err
 
 
 def test_a_coolant_that_the_definition_has_is_not_given_a_second_time(
