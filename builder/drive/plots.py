@@ -68,10 +68,9 @@ def plot_cycle(
         moving = [i.quantity for i in inputs.values() if not i.quantity.is_temperature]
         labels = {q.column: q.label for q in moving or [i.quantity for i in inputs.values()]}
         draw_inputs(driving, time, columns, labels)
-        curves_of = temperature_curves(columns)
         hidden = {node for group in groups.values() for node in group[1:-1]} | {"air", "frame"}
         hidden -= {max(group, key=lambda node: columns[f"T_{node}_degC"].max()) for group in groups.values() if group}
-        shown = {node: curve for node, curve in curves_of.items() if node not in hidden}
+        shown = {node: curve for node, curve in temperature_curves(columns).items() if node not in hidden}
         drawn = [(losses, "losses", loss_curves(columns)) for losses in between]
         for axes, what, curves in (*drawn, (temperatures, "temperatures", shown)):
             draw_curves(axes, time, curves, members(columns, what))

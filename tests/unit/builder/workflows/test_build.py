@@ -19,7 +19,7 @@ from builder.native import compile as native_compile
 from builder.native.compile import NoCompilerError, host_platform
 from builder.surrogate.train import TrainingResult
 from builder.workflows import build as builder_build
-from builder.workflows.build import build, cycle_errors
+from builder.workflows.build import BuildReport, CycleErrors, build, cycle_errors
 from builder.workflows.known_physics import known_finding
 from models.assembly.gearbox import Gearbox, load_gearbox
 from models.correction.correction import Correction, Estimate, MeanLoss
@@ -60,6 +60,16 @@ def test_an_fmu_that_cannot_run_here_is_built_and_that_is_told(
     assert [note for note in again.notes if "earlier" in note] == [
         f"{tmp_path / 'fzg.fmu'} is of an earlier build: report.json and networks/ no longer describe it"
     ]
+
+
+def test_what_the_cycle_reaches_of_the_range_of_training_is_shown(
+    fzg_training: TrainingResult, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cycle = CycleErrors(temperature_K={"oil": 0.1}, loss_mean=0.01, loss_worst=0.02)
+    BuildReport(
+        gearbox="FZG", training=fzg_training, cycles={"fzg.fmu": cycle}, seconds={}, files=(), purpose=""
+    ).show()
+    assert "(up to 2275 1/min of 6500, 280 N m of 350;" in capsys.readouterr().out
 
 
 @pytest.mark.slow

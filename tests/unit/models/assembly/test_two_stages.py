@@ -6,12 +6,14 @@ import re
 
 import numpy as np
 import pytest
+import sympy as sp
 
 from builder.surrogate.networks import PRESETS, network_specs
 from models.assembly.gearbox import load_gearbox, read_gearbox
 from models.base.errors import InputError
 from models.files.toml_file import packaged, read_text
 from models.mechanisms.places import placements
+from models.simulation.thermal_network import Link, ThermalNetwork
 
 TEXT = read_text(packaged("gearboxes", "two_stage"))
 TWO = load_gearbox("two_stage")
@@ -178,3 +180,24 @@ def test_a_fault_of_the_losses_may_be_in_one_stage_or_in_both() -> None:
     assert [one.name for one in placements(network, "source", "mesh", ())] == ["mesh"]
     (every,) = placements(network, "loss_factor", "losses", ())
     assert len(every.target) == 14
+
+
+@pytest.mark.parametrize("stage", [0, 1])
+def test_heat_paths_of_gears_and_mesh_are_those_of_the_stage_alone(stage: int) -> None:
+    """At the speed and torque of the stage's own shaft: striction in the contact, and what oil takes from the gears."""
+    single = read_gearbox(alone(stage), file="alone.toml")
+    shaft = TWO.stage[stage].driver
+    here = {"speed": 700.0 * TWO.speed_ratio[shaft], "torque": 90.0 * TWO.geometry.torque_ratio[shaft]}
+    both, own = (
+        {link.name: float(link.conductance.xreplace(numbers_at(link, network, at))) for link in network.links}
+        for network, at in ((TWO.network(), {"speed": 700.0, "torque": 90.0}), (single.network(), here))
+    )
+    for gear in TWO.stage[stage].names:
+        assert both[f"mesh_{stage + 1}-{gear}"] == pytest.approx(own[f"mesh-{gear}"], rel=1e-12)
+        assert both[f"{gear}-oil"] == pytest.approx(own[f"{gear}-oil"], rel=1e-12)
+
+
+def numbers_at(link: Link, network: ThermalNetwork, at: dict[str, float]) -> dict[sp.Symbol, sp.Float]:
+    """Symbols of a conductance by their numbers: inputs as given, parameters as they start, all parts at 55 degC."""
+    known = at | {p.name: p.start for p in network.parameters}
+    return {s: sp.Float(known.get(s.name, 55.0)) for s in link.conductance.free_symbols}
