@@ -3,8 +3,9 @@
 Three ways to a case, each with an order to read it in:
 
 - A plant of the own kind (``plant``, ``cases``), finer than the model: ``plant.anatomy`` (nodes and paths),
-  ``plant.laws``, ``plant.effects_*`` (what may be concealed), ``plant.plant_run`` (many runs at once),
-  ``plant.instruments`` (what is recorded of them); ``cases.conceal`` draws cases and calls all of these.
+  ``plant.laws``, ``plant.effects_*`` (what may be concealed, in the words of ``plant.draws``), ``plant.plant_run``
+  (many runs at once), ``plant.instruments`` (what is recorded of them); ``cases.conceal`` draws cases and calls all of
+  these.
 - A plant of the zoo (``zoo``), of another structure: ``zoo.structure`` (what a plant is), ``zoo.families`` (who draws
   one), ``zoo.laws`` and ``zoo.run`` (its heat balance in time), ``zoo.setting`` and ``zoo.effects_*`` (what may be
   concealed), ``zoo.oracle`` (evidence that recordings hold), ``zoo.recorder``; ``zoo.draw`` draws a case with these,

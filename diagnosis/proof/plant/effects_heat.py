@@ -7,52 +7,27 @@ from collections.abc import Mapping
 import numpy as np
 
 from diagnosis.proof.plant.anatomy import OIL
-from diagnosis.proof.plant.effect import Draw, Effect, Grip
-from diagnosis.proof.plant.effects_losses import CHURNING, at, bearing, drawn, output_shaft, relative, share_of_loss
+from diagnosis.proof.plant.draws import (
+    all_parts,
+    at,
+    bearing,
+    gears,
+    highest_part,
+    input_shaft,
+    lowest_part,
+    output_shaft,
+    relative,
+    shafts,
+    share_of_loss,
+    share_of_shed,
+)
+from diagnosis.proof.plant.effect import Effect, Grip
+from diagnosis.proof.plant.effects_losses import CHURNING
 from diagnosis.proof.plant.plant import REFERENCE_SPEED, Plant
 from models.formulas.heat_transfer import STEFAN_BOLTZMANN
 from models.quantities.units import KELVIN
 
 STEP_H = 10.0 / 3600.0
-
-
-def share_of_shed(nominal: float, **others: tuple[float, float]) -> Draw:
-    """Strength ``a`` [W/K] as a share of what the housing sheds (7 W/K on the FZG rig), others drawn evenly."""
-
-    def draw(plant: Plant, rng: np.random.Generator, strength: float) -> Mapping[str, float]:
-        return {"a": nominal * plant.shed_ref * strength} | drawn(plant, rng, others)
-
-    return draw
-
-
-def lowest_part(plant: Plant, _: np.random.Generator) -> tuple[str, ...]:
-    """The part of the housing that stands."""
-    return (plant.anatomy.parts[0],)
-
-
-def highest_part(plant: Plant, _: np.random.Generator) -> tuple[str, ...]:
-    """The part of the housing on top."""
-    return (plant.anatomy.parts[-1],)
-
-
-def all_parts(plant: Plant, _: np.random.Generator) -> tuple[str, ...]:
-    """The whole housing."""
-    return plant.anatomy.parts
-
-
-def shafts(plant: Plant, _: np.random.Generator) -> tuple[str, ...]:
-    """All shafts."""
-    return plant.anatomy.shafts
-
-
-def gears(plant: Plant, _: np.random.Generator) -> tuple[str, ...]:
-    """Both gears."""
-    return plant.anatomy.gears
-
-
-def input_shaft(plant: Plant, _: np.random.Generator) -> tuple[str, ...]:
-    """The input shaft."""
-    return (plant.gearbox.stage[0].driver,)
 
 
 # ---------------------------------------------------------------------- heat paths

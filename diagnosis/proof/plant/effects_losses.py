@@ -2,71 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from diagnosis.proof.plant.anatomy import MESH, OIL
-from diagnosis.proof.plant.effect import Draw, Effect, Grip, Places
-from diagnosis.proof.plant.plant import REFERENCE_SPEED, Plant
+from diagnosis.proof.plant.draws import (
+    all_bearings,
+    at,
+    bearing,
+    bearings_of_input,
+    output_shaft,
+    relative,
+    share_of_loss,
+)
+from diagnosis.proof.plant.effect import Effect, Grip
+from diagnosis.proof.plant.plant import REFERENCE_SPEED
 from diagnosis.proof.plant.sizes import T_SERVICE
 from models.losses.bearing import BearingLaw
 from models.portable.evaluation import RPM
 
-TEMPERATURES, DIFFERENCES = {"T", "T_on", "T_off", "T_melt"}, {"band", "dT"}
 SLIDING, ROLLING, CHURNING = "mesh_sliding", "mesh_rolling", "churning"
-
-
-def at(*places: str) -> Places:
-    """Always the same places."""
-    return lambda _plant, _rng: places
-
-
-def drawn(plant: Plant, rng: np.random.Generator, ranges: Mapping[str, tuple[float, float]]) -> dict[str, float]:
-    """Parameters drawn evenly; temperatures are those of the FZG rig and move with how warm another gearbox gets."""
-    values = {name: float(rng.uniform(*bounds)) for name, bounds in ranges.items()}
-    values |= {name: plant.as_warm(values[name]) for name in values.keys() & TEMPERATURES}
-    return values | {name: values[name] * plant.warmth for name in values.keys() & DIFFERENCES}
-
-
-def share_of_loss(nominal: float, **others: tuple[float, float]) -> Draw:
-    """Strength ``a`` [W] as a share of the plant's reference loss (330 W on the FZG rig), others drawn evenly."""
-
-    def draw(plant: Plant, rng: np.random.Generator, strength: float) -> Mapping[str, float]:
-        return {"a": nominal * plant.loss_ref * strength} | drawn(plant, rng, others)
-
-    return draw
-
-
-def relative(nominal: float, highest: float = np.inf, **others: tuple[float, float]) -> Draw:
-    """Strength ``a`` without unit, held at `highest`, others drawn evenly."""
-
-    def draw(plant: Plant, rng: np.random.Generator, strength: float) -> Mapping[str, float]:
-        return {"a": min(nominal * strength, highest)} | drawn(plant, rng, others)
-
-    return draw
-
-
-def bearing(plant: Plant, rng: np.random.Generator) -> tuple[str, ...]:
-    """One bearing."""
-    names = plant.anatomy.bearings
-    return (names[int(rng.integers(len(names)))],)
-
-
-def all_bearings(plant: Plant, _: np.random.Generator) -> tuple[str, ...]:
-    """All bearings."""
-    return plant.anatomy.bearings
-
-
-def bearings_of_input(plant: Plant, _: np.random.Generator) -> tuple[str, ...]:
-    """The bearings of the input shaft."""
-    shaft = plant.gearbox.stage[0].driver
-    return tuple(b.name for b in plant.gearbox.bearing if b.shaft == shaft)
-
-
-def output_shaft(plant: Plant, _: np.random.Generator) -> tuple[str, ...]:
-    """The output shaft."""
-    return (plant.gearbox.stage[0].driven,)
 
 
 # ---------------------------------------------------------------------- no-load losses

@@ -8,19 +8,21 @@ import numpy as np
 
 from diagnosis.proof.plant.anatomy import MESH, OIL
 from diagnosis.proof.plant.cycles import ROW_S, STAIRS
-from diagnosis.proof.plant.effect import Draw, Effect, Grip, Hook, Kind, Places
-from diagnosis.proof.plant.effects_heat import highest_part, input_shaft, lowest_part, share_of_shed
-from diagnosis.proof.plant.effects_losses import (
-    ROLLING,
-    SLIDING,
+from diagnosis.proof.plant.draws import (
     at,
     bearing,
     bearings_of_input,
     drawn,
+    highest_part,
+    input_shaft,
+    lowest_part,
     output_shaft,
     relative,
     share_of_loss,
+    share_of_shed,
 )
+from diagnosis.proof.plant.effect import Draw, Effect, Grip, Hook, Kind, Places
+from diagnosis.proof.plant.effects_losses import ROLLING, SLIDING
 from diagnosis.proof.plant.plant import Plant
 
 

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.signal import lfilter, lfiltic
 
 from diagnosis.proof.plant.cycles import ROW_S, reference_torque
+from diagnosis.proof.plant.draws import at, either, one_of, relative
 from diagnosis.proof.plant.effect import Concealed, Draw, Effect, Kind, Places
-from diagnosis.proof.plant.effects_losses import at
 from diagnosis.proof.plant.plant import Plant
 from diagnosis.proof.plant.plant_run import Outcome, Run
 from models.base.types import Array
@@ -198,19 +198,6 @@ def _hold_readings(fault: Concealed, readings: dict[str, Array]) -> None:
         values[start:end] = values[start]
 
 
-def sensor(plant: Plant, rng: np.random.Generator) -> tuple[str, ...]:
-    """One measured place."""
-    names = default_channels(plant)
-    return (names[int(rng.integers(len(names)))],)
-
-
-def two_unlike_sensors(plant: Plant, rng: np.random.Generator) -> tuple[str, ...]:
-    """Two measured places that differ by some kelvin: a gear and something outside the gears."""
-    gear = plant.anatomy.gears[0]
-    others = [name for name in default_channels(plant) if name != gear]
-    return gear, others[int(rng.integers(len(others)))]
-
-
 def default_channels(plant: Plant) -> tuple[str, ...]:
     """Default measured places: housing, oil, a bearing of every shaft, the first gear."""
     anatomy, stage = plant.anatomy, plant.gearbox.stage[0]
@@ -218,18 +205,11 @@ def default_channels(plant: Plant) -> tuple[str, ...]:
     return ("oil", *anatomy.parts, *first, anatomy.gears[0])
 
 
-def _either(nominal: float, **others: tuple[float, float]) -> Draw:
-    """Strength of either sign."""
-
-    def draw(_plant: Plant, rng: np.random.Generator, strength: float) -> Mapping[str, float]:
-        a = nominal * strength * (1.0 if rng.random() < 0.5 else -1.0)
-        return {"a": a} | {k: float(rng.uniform(*v)) for k, v in others.items()}
-
-    return draw
-
-
-def _positive(nominal: float) -> Draw:
-    return lambda _plant, _rng, strength: {"a": nominal * strength}
+def two_unlike_sensors(plant: Plant, rng: np.random.Generator) -> tuple[str, ...]:
+    """Two measured places that differ by some kelvin: a gear and something outside the gears."""
+    gear = plant.anatomy.gears[0]
+    others = [name for name in default_channels(plant) if name != gear]
+    return gear, others[int(rng.integers(len(others)))]
 
 
 def _torque(plant: Plant, rng: np.random.Generator, strength: float) -> Mapping[str, float]:
@@ -246,17 +226,18 @@ def _fault(name: str, places: Places, draw: Draw, law: str, kind: Kind = "sensor
 
 
 SENSOR_EFFECTS = (
-    _fault("sensor_bias", sensor, _either(2.0), "reading + a K"),
-    _fault("sensor_drift", sensor, _either(0.15), "reading + a t^0.9 K, t in hours"),
-    _fault("sensor_gain", sensor, _either(0.05), "reading + a (reading - 20 degC)"),
-    _fault("sensor_lag", sensor, _positive(80.0), "a first-order lag of a seconds more"),
-    _fault("sensor_stuck", sensor, _stuck, "the reading stands still from one fraction of the recording to another"),
-    _fault("swapped_channels", two_unlike_sensors, _positive(1.0), "two columns exchanged"),
-    _fault("clock_offset", at("clock"), _either(90.0), "temperatures are stamped a seconds late"),
+    _fault("sensor_bias", one_of(default_channels), either(2.0), "reading + a K"),
+    _fault("sensor_drift", one_of(default_channels), either(0.15), "reading + a t^0.9 K, t in hours"),
+    _fault("sensor_gain", one_of(default_channels), either(0.05), "reading + a (reading - 20 degC)"),
+    _fault("sensor_lag", one_of(default_channels), relative(80.0), "a first-order lag of a seconds more"),
+    _fault("sensor_stuck", one_of(default_channels), _stuck,
+           "the reading stands still from one fraction of the recording to another"),
+    _fault("swapped_channels", two_unlike_sensors, relative(1.0), "two columns exchanged"),
+    _fault("clock_offset", at("clock"), either(90.0), "temperatures are stamped a seconds late"),
     _fault("torque_offset", at("torque"), _torque, "recorded torque = true + a N m", "signal"),
-    _fault("torque_gain", at("torque"), _either(0.06), "recorded torque = true (1 + a)", "signal"),
-    _fault("speed_gain", at("speed"), _either(0.05), "recorded speed = true (1 + a)", "signal"),
-    _fault("ambient_probe_offset", at("T_ambient"), _either(2.0), "recorded ambient = true + a K", "signal"),
-    _fault("ambient_probe_heated", at("T_ambient"), _positive(0.07), "recorded ambient = true + a (housing - true)",
+    _fault("torque_gain", at("torque"), either(0.06), "recorded torque = true (1 + a)", "signal"),
+    _fault("speed_gain", at("speed"), either(0.05), "recorded speed = true (1 + a)", "signal"),
+    _fault("ambient_probe_offset", at("T_ambient"), either(2.0), "recorded ambient = true + a K", "signal"),
+    _fault("ambient_probe_heated", at("T_ambient"), relative(0.07), "recorded ambient = true + a (housing - true)",
            "signal"),
 )  # fmt: skip
