@@ -10,7 +10,7 @@ import numpy as np
 from diagnosis.proof.cases.time_course import ALWAYS, Course
 from diagnosis.proof.zoo.case import BASELINE, CONTROLS, HOLD, TRAIN, NatsOf, ZooCase, ZooPlan, nats_of_case, run_case
 from diagnosis.proof.zoo.distance import Drawn, draw_plant
-from diagnosis.proof.zoo.effects import Maker, ZooEffect, made
+from diagnosis.proof.zoo.effects import Maker, ZooEffect
 from diagnosis.proof.zoo.effects_dates import DATED_MAKERS, draw_course
 from diagnosis.proof.zoo.effects_heat import HEAT_MAKERS
 from diagnosis.proof.zoo.effects_losses import LOSS_MAKERS
@@ -172,8 +172,7 @@ def _draw_one(kind: str, setting: Setting, rng: np.random.Generator) -> ZooEffec
     name = str(rng.choice(list(makers)))
     if course.kind != "always" and name in AGEING:
         raise UnfitError(name)
-    catalogue = name if makers is CATALOGUE_MAKERS else None
-    return made(name, makers[name], setting, rng, catalogue=catalogue, course=course)
+    return replace(makers[name](setting, rng), course=course)
 
 
 def draw_fault(name: str, setting: Setting, rng: np.random.Generator, course: Course) -> ZooEffect:
@@ -221,7 +220,7 @@ def draw_fault(name: str, setting: Setting, rng: np.random.Generator, course: Co
 def list_effects() -> list[list[str]]:
     """Name of every effect, whether it is a form of one of the catalogue, and what it is."""
     rows = [
-        [name, "yes" if name in CATALOGUE_MAKERS else "no", str(maker.draw.__doc__)]
+        [name, "yes" if name in CATALOGUE_MAKERS else "no", str(maker.__doc__)]
         for name, maker in {**CATALOGUE_MAKERS, **OUTSIDE_MAKERS, **DATED_MAKERS}.items()
     ]
     faults = [[name, "yes" if maker.in_catalogue else "no", maker.law] for name, maker in FAULT_MAKERS.items()]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, wraps
 
 import numpy as np
 
@@ -20,8 +20,8 @@ UNITS = {"source": "W", "link": "W/K"}  # of a strength by the kind of the effec
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Draft:
-    """An effect as its maker draws it.
+class ZooEffect:
+    """One concealed effect of one plant.
 
     Attributes
     ----------
@@ -29,76 +29,31 @@ class Draft:
         At a strength of 1, without its course in time
     law : str
         In words and symbols; ``a`` is the strength
-    cap : float
-        Greatest strength that is physical
+    cap, least : float
+        Greatest strength that is physical, and the least that stands out of ordinary errors of instruments
     unit : str
-        Of the strength; of a draft empty if it is that of its kind, see :data:`UNITS`
+        Of the strength
     parameters : mapping of str to float
         What was drawn for this specimen
-    """
-
-    act: Act = field(default_factory=Act)
-    law: str
-    cap: float
-    unit: str = ""
-    parameters: Mapping[str, float] = field(default_factory=dict)
-
-
-def draft(act: Act, law: str, cap: float, unit: str = "", /, **parameters: float) -> Draft:
-    """Draft of what was drawn."""
-    return Draft(act=act, law=law, cap=cap, unit=unit, parameters=parameters)
-
-
-Draw = Callable[[Setting, np.random.Generator], Draft]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Maker:
-    """Kind of effect.
-
-    Attributes
-    ----------
     family, kind : str
         As in the catalogue: kind is ``source``, ``link``, ``loss_factor``, ``link_factor``, ``signal`` ...
-    draw : callable
-        Of the setting and a random generator: the draft. Raises UnfitError if the plant lacks what it needs.
-    """
-
-    family: str
-    kind: str
-    draw: Draw
-
-
-def makes(kind: str, family: str, *, table: dict[str, Maker]) -> Callable[[Draw], Draw]:
-    """Enter the decorated function into a table of makers, under its own name."""
-
-    def enter(draw: Draw) -> Draw:
-        table[draw.__name__] = Maker(family=family, kind=kind, draw=draw)
-        return draw
-
-    return enter
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ZooEffect(Draft):
-    """One concealed effect of one plant.
-
-    Attributes
-    ----------
     catalogue : str or None
         Mechanism of the catalogue that it is a form of
     fault : Fault or None
         Of measurement, at its strength
-    least : float
-        Least strength that stands out of ordinary errors of instruments
     """
 
     name: str
     catalogue: str | None
     family: str
     kind: str
-    fault: Fault | None = None
+    law: str
+    unit: str
+    cap: float
     least: float = 0.0
+    act: Act = field(default_factory=Act)
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    fault: Fault | None = None
     strength: float = 1.0
     course: Course = ALWAYS
 
@@ -130,19 +85,32 @@ class ZooEffect(Draft):
         return replace(self, strength=strength, fault=fault)
 
 
-def made(
-    name: str, maker: Maker, setting: Setting, rng: np.random.Generator, *, catalogue: str | None, course: Course
-) -> ZooEffect:
-    """Draw an effect for a plant; its strength is still 1.
+Maker = Callable[[Setting, np.random.Generator], ZooEffect]  # UnfitError if the plant lacks what it needs
 
-    Raises
-    ------
-    UnfitError
-        If the plant lacks what it needs.
-    """
-    drawn = maker.draw(setting, rng)
-    facts = {**vars(drawn), "unit": drawn.unit or UNITS.get(maker.kind, "1")}
-    return ZooEffect(**facts, name=name, catalogue=catalogue, family=maker.family, kind=maker.kind, course=course)
+
+def draft(act: Act, law: str, cap: float, unit: str = "", /, **parameters: float) -> ZooEffect:
+    """An effect as it is drawn; :func:`makes` adds its name, and the unit of its kind if none is given."""
+    return ZooEffect(
+        name="", catalogue=None, family="", kind="", law=law, unit=unit, cap=cap, act=act, parameters=parameters
+    )
+
+
+def makes(kind: str, family: str, *, table: dict[str, Maker], in_catalogue: bool = False) -> Callable[[Maker], Maker]:
+    """Enter the decorated function into a table of makers, under its own name, which its effects get."""
+
+    def enter(draw: Maker) -> Maker:
+        name = draw.__name__
+
+        @wraps(draw)
+        def make(setting: Setting, rng: np.random.Generator) -> ZooEffect:
+            drawn, catalogue = draw(setting, rng), name if in_catalogue else None
+            unit = drawn.unit or UNITS.get(kind, "1")
+            return replace(drawn, name=name, catalogue=catalogue, family=family, kind=kind, unit=unit)
+
+        table[name] = make
+        return make
+
+    return enter
 
 
 def _in_time(law: Law, strength: float, course: Course) -> Law:

@@ -8,7 +8,7 @@ import numpy as np
 
 from diagnosis.proof.cases.time_course import FORMS, Course
 from diagnosis.proof.zoo import effects
-from diagnosis.proof.zoo.effects import Draft, Maker, draft
+from diagnosis.proof.zoo.effects import Maker, ZooEffect, draft
 from diagnosis.proof.zoo.setting import Setting, UnfitError, either, pick
 from diagnosis.proof.zoo.structure import constant
 
@@ -18,7 +18,7 @@ DOWN, UP = 0.9, 2.0  # greatest relative changes
 
 
 @makes("loss_factor")
-def loss_changes(s: Setting, rng: np.random.Generator) -> Draft:
+def loss_changes(s: Setting, rng: np.random.Generator) -> ZooEffect:
     """One loss grows or falls."""
     if not s.losses_all:
         raise UnfitError("losses")
@@ -26,7 +26,7 @@ def loss_changes(s: Setting, rng: np.random.Generator) -> Draft:
 
 
 @makes("source")
-def heat_changes(s: Setting, rng: np.random.Generator) -> Draft:
+def heat_changes(s: Setting, rng: np.random.Generator) -> ZooEffect:
     """A heat that is no loss grows or falls."""
     names = [n for one in s.plant.sources if not one.is_loss for n in one.part_of.split("+") if n]
     if not names:
@@ -35,26 +35,26 @@ def heat_changes(s: Setting, rng: np.random.Generator) -> Draft:
 
 
 @makes("link_factor")
-def link_changes(s: Setting, rng: np.random.Generator) -> Draft:
+def link_changes(s: Setting, rng: np.random.Generator) -> ZooEffect:
     """One link conducts more or less."""
     return _relative(s, rng, "link", s.links)
 
 
 @makes("capacity")
-def capacity_changes(s: Setting, rng: np.random.Generator) -> Draft:
+def capacity_changes(s: Setting, rng: np.random.Generator) -> ZooEffect:
     """One node stores more or less."""
     return _relative(s, rng, "capacity", s.nodes)
 
 
 @makes("source")
-def heat_appears(s: Setting, rng: np.random.Generator) -> Draft:
+def heat_appears(s: Setting, rng: np.random.Generator) -> ZooEffect:
     """A constant heat into one node."""
     node = pick(s.nodes, rng)
     return draft(s.heat(node, constant(1.0)), f"a into {node}", 0.3 * s.loss)
 
 
 @makes("link")
-def link_appears(s: Setting, rng: np.random.Generator) -> Draft:
+def link_appears(s: Setting, rng: np.random.Generator) -> ZooEffect:
     """A further way from one node to the air."""
     node = pick(s.nodes, rng)
     act = s.bridge(node, s.air(), constant(1.0), called="air")
@@ -62,7 +62,7 @@ def link_appears(s: Setting, rng: np.random.Generator) -> Draft:
 
 
 @makes("signal")
-def set_point_changes(s: Setting, rng: np.random.Generator) -> Draft:
+def set_point_changes(s: Setting, rng: np.random.Generator) -> ZooEffect:
     """A control that misses: the true input is larger or smaller than the recorded one."""
     names = [name for name in ("torque", "speed", "heater_power") if name in s.plant.inputs]
     if not names:
@@ -72,7 +72,7 @@ def set_point_changes(s: Setting, rng: np.random.Generator) -> Draft:
     return draft(act, f"true {name} = recorded (1 {_plus(sign)} a)", 0.2)
 
 
-def _relative(s: Setting, rng: np.random.Generator, what: str, names: tuple[str, ...]) -> Draft:
+def _relative(s: Setting, rng: np.random.Generator, what: str, names: tuple[str, ...]) -> ZooEffect:
     name, sign = pick(names, rng), either(rng)
     law = constant(float(sign))
     if what == "link":

@@ -11,13 +11,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from diagnosis.proof.cases.time_course import ALWAYS, Course
+from diagnosis.proof.cases.time_course import Course
 from diagnosis.proof.plant import cycles
 from diagnosis.proof.zoo import draw
 from diagnosis.proof.zoo.case import ZooCase, ZooPlan, run_case
 from diagnosis.proof.zoo.conceal_zoo import conceal_zoo, record_case, write_zoo_case, zoo_plans
 from diagnosis.proof.zoo.distance import Drawn
-from diagnosis.proof.zoo.effects import ZooEffect, made
+from diagnosis.proof.zoo.effects import ZooEffect
 from diagnosis.proof.zoo.families import FAMILIES
 from diagnosis.proof.zoo.faults import Measured, spoiled
 from diagnosis.proof.zoo.oracle import OracleNats
@@ -109,9 +109,9 @@ def test_effects_keep_their_order_by_which_seeds_draw_them() -> None:
 
 def test_every_effect_acts_in_the_direction_of_its_truth(setting: Setting, drawn: Drawn) -> None:
     rng, effects = np.random.default_rng(2), []
-    for name, maker in ALL.items():
+    for maker in ALL.values():
         try:
-            effect = made(name, maker, setting, rng, catalogue=name, course=ALWAYS)
+            effect = maker(setting, rng)
         except UnfitError:
             continue
         effects.append(effect.with_strength(0.3 * effect.cap))
@@ -136,7 +136,7 @@ def test_a_date_counts_from_the_first_row_and_lasts(setting: Setting, drawn: Dra
     last = drawn.programmes[4]
     to_h = {"step": np.inf, "ramp": at_h + 0.1, "from_to": last.begins_h - 0.5}[kind]
     course = Course(kind=kind, begins=at_h, ends=to_h)  # type: ignore[arg-type]
-    effect = made("windage", ALL["windage"], setting, np.random.default_rng(1), catalogue="windage", course=course)
+    effect = replace(ALL["windage"](setting, np.random.default_rng(1)), course=course)
     case = case_of(drawn, fzg, "date", effect.with_strength(0.2 * effect.cap))
     shift = {p.name: case.runs.outcomes[p.name].readings["oil"] for p in case.recordings("train", "hold")}
     before = int(at_h * 360.0)
@@ -207,7 +207,7 @@ def test_same_seed_same_bytes_and_healthy_baselines(
 
 
 def test_baselines_share_the_plant_up_to_the_deviation(drawn: Drawn, fzg: Gearbox, setting: Setting) -> None:
-    effect = made("windage", ALL["windage"], setting, np.random.default_rng(1), catalogue="windage", course=ALWAYS)
+    effect = ALL["windage"](setting, np.random.default_rng(1))
     case = case_of(drawn, fzg, "single", effect)
     off = [np.log(v / drawn.plant.parameters[n]) for n, v in case.sessions["baseline_1"].items()]
     assert len(off) == len(drawn.plant.spread) and 0.02 < np.std(off) < 0.04
