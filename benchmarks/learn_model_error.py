@@ -25,8 +25,9 @@ from diagnosis.engine.gram import Given, gram_of, whitened_base
 from diagnosis.engine.learnt import error_classes, widest_class
 from diagnosis.engine.model_error import ModelError
 from diagnosis.engine.prepare import prepare_experiment
+from diagnosis.proof.cases.case_files import write_case
 from diagnosis.proof.zoo.case import ZooPlan
-from diagnosis.proof.zoo.conceal_zoo import write_zoo_case
+from diagnosis.proof.zoo.conceal_zoo import files_of_case
 from diagnosis.proof.zoo.draw import draw_case
 from diagnosis.proof.zoo.families import FAMILIES
 from diagnosis.recordings.read import read_recordings
@@ -86,7 +87,7 @@ def keep(family: str, machine: str, seed: int, file: Path) -> None:
         print(f"{file.stem}: {error}")
         return
     with tempfile.TemporaryDirectory() as folder:
-        write_zoo_case(case, Path(folder), None)
+        write_case(files_of_case(case), Path(folder), None)
         paths = [str(path) for path in sorted(Path(folder).glob("train_*.csv.gz"))]
         recordings = read_recordings(paths, gearbox.network())
     _, experiment = prepare_experiment(gearbox, recordings, recordings)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -14,7 +15,10 @@ from builder.base.progress import LOADING, progress
 from models.assembly.gearbox import load_gearbox
 from models.base.errors import InputError
 
-Make = Callable[..., list[str]]  # of the folders for recordings and truth; writes cases and returns their names
+if TYPE_CHECKING:
+    from diagnosis.proof.cases.case_files import CaseFiles
+
+Make = Callable[..., "Iterator[CaseFiles]"]  # of whom progress is reported to
 
 
 def _list_effects(context: click.Context, _: click.Parameter, asked: bool) -> None:
@@ -121,10 +125,10 @@ def conceal(
             what = "simulating the recordings, percent"
             make = _in_own_plant(gearbox, seed, number, effect=effect, random=random, strength=strength)
 
-    from diagnosis.proof.cases.case_files import staged_folders
+    from diagnosis.proof.cases.case_files import staged_folders, write_cases
 
     with staged_folders(recordings, truth) as (stage, truth_stage), progress(what) as told:
-        names = make(recordings=stage, truth=truth_stage, flat=cases is None, progress=partial(told, what))
+        names = write_cases(make(progress=partial(told, what)), stage, truth_stage, flat=cases is None)
     for name in names:
         console.out.print(f"wrote {recordings / ('' if cases is None else name)}, {truth / name}.json")
 

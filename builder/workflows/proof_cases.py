@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from diagnosis.proof.cases.case_files import case_names
+from diagnosis.proof.cases.case_files import case_names, write_case, write_cases
 from diagnosis.proof.cases.conceal import conceal_set, draw_case, mix_of, mixed_plans
 from diagnosis.proof.scoring.lines import Settings
 from models.assembly.gearbox import Gearbox, load_gearbox
@@ -71,20 +71,18 @@ def make_cases(settings: Settings, recordings: Path, truth: Path, jobs: int, pro
     own = mixed_plans(settings.seed, mix_of(settings.cases))
     if missing:
         with atomic_folder(recordings) as stage, atomic_folder(truth) as truth_stage:
-            conceal_set(
-                load_gearbox(settings.gearbox), own, seed=settings.seed, recordings=stage, truth=truth_stage,
-                progress=partial(progress, "making recordings"),
-            )  # fmt: skip
+            told = partial(progress, "making recordings")
+            cases = conceal_set(load_gearbox(settings.gearbox), own, seed=settings.seed, progress=told)
+            write_cases(cases, stage, truth_stage)
     return {name: plan.effects[0] for name, plan in zip(names, own, strict=True) if plan.group == "single"}
 
 
 def make_zoo_case(name: str, plan: ZooPlan, recordings: Path, truth: Path, baselines: int) -> None:
     """Draw a case of the zoo and write its recordings, so many baselines too, and its definition; its truth apart."""
-    from diagnosis.proof.zoo.conceal_zoo import write_zoo_case
+    from diagnosis.proof.zoo.conceal_zoo import files_of_case
     from diagnosis.proof.zoo.draw import draw_case
 
-    case = draw_case(plan, name=name, baselines=baselines)
-    write_zoo_case(case, recordings / name, truth / f"{name}.json")
+    write_case(files_of_case(draw_case(plan, name=name, baselines=baselines)), recordings / name, truth)
 
 
 def add_evidence(settings: Settings, truth: Path, jobs: int, progress: Progress) -> None:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import gzip
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -60,55 +61,76 @@ def staged_folders(recordings: Path, truth: Path) -> Iterator[tuple[Path, Path]]
                     raise InputError(f"{there}: is of another case, which would be lost; choose another output")
 
 
-def write_case(
-    folder: Path,
-    truth_file: Path | None,
-    recordings: Mapping[str, Mapping[str, Array]],
-    truth: Mapping[str, Any],
-    stated: Mapping[str, float] | None = None,
-    definition: str | None = None,
-) -> None:
-    """Write the recordings into a folder and the truth into a file outside it.
+@dataclass(frozen=True, kw_only=True)
+class CaseFiles:
+    """A case as it is written.
+
+    Attributes
+    ----------
+    files : mapping of name to bytes
+        Of its folder
+    truth : mapping
+        Ready for JSON; it goes into ``<case>.json`` outside the folder
+    """
+
+    name: str
+    files: Mapping[str, bytes]
+    truth: Mapping[str, Any]
+
+
+def files_of_recordings(
+    recordings: Mapping[str, Mapping[str, Array]], stated: Mapping[str, float] | None
+) -> dict[str, bytes]:
+    """Files of simulated recordings by name: ``<recording>.csv.gz`` and, if sensors have one, their data sheet.
 
     Parameters
     ----------
-    folder : Path
-        Gets ``<recording>.csv.gz`` and, if anything is stated of the sensors, ``mapping.toml``
-    truth_file : Path or None
-        Outside `folder`; see :func:`staged_folders`. None: the truth is not written
     recordings : mapping of name to columns
     stated : mapping of key to float, or None
         Data sheet of every temperature sensor, by the keys of a mapping file; it may be wrong
-    definition : str or None
-        Text of ``gearbox.toml``, if the folder gets one
+    """
+    # Neither name nor time go into the archive, so that the same case gives the same bytes.
+    files = {
+        f"{name}.csv.gz": gzip.compress(_csv(columns), compresslevel=6, mtime=0) for name, columns in recordings.items()
+    }
+    return files if stated is None else {**files, MAPPING: _mapping(recordings, stated).encode()}
+
+
+def write_case(case: CaseFiles, folder: Path, truth: Path | None) -> None:
+    """Write the files of a case into its folder and then the truth, if there is one, into a folder of truths.
 
     Raises
     ------
     InputError
         If something cannot be written.
     """
-    # Neither name nor time go into the archive, so that the same case gives the same bytes.
-    files = {
-        f"{name}.csv.gz": gzip.compress(_csv(columns), compresslevel=6, mtime=0) for name, columns in recordings.items()
-    }
-    if stated is not None:
-        files[MAPPING] = _mapping(recordings, stated).encode()
-    if definition is not None:
-        files[DEFINITION] = definition.encode()
-    write_files(folder, files, truth_file, truth)
-
-
-def write_files(folder: Path, files: Mapping[str, bytes], truth_file: Path | None, truth: Mapping[str, Any]) -> None:
-    """Write files of a case, by name, into a folder and the truth into a file outside it; as :func:`write_case`."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for name, content in files.items():
+        for name, content in case.files.items():
             (folder / name).write_bytes(content)
-        if truth_file is not None:
-            truth_file.parent.mkdir(parents=True, exist_ok=True)
-            truth_file.write_bytes((json.dumps(truth, indent=1, sort_keys=True, allow_nan=False) + "\n").encode())
+        if truth is not None:
+            truth.mkdir(parents=True, exist_ok=True)
+            text = json.dumps(case.truth, indent=1, sort_keys=True, allow_nan=False) + "\n"
+            (truth / f"{case.name}.json").write_bytes(text.encode())
     except OSError as error:
         raise InputError(f"{error.filename}: cannot be written ({error.strerror}); choose another output") from error
+
+
+def write_cases(cases: Iterable[CaseFiles], recordings: Path, truth: Path, *, flat: bool = False) -> list[str]:
+    """Write cases as they are made, each into a folder of its name, and return their names.
+
+    Parameters
+    ----------
+    recordings, truth : Path
+        Two folders; see :func:`staged_folders`
+    flat : bool
+        True to write the files of a single case straight into `recordings`
+    """
+    names = []
+    for case in cases:
+        write_case(case, recordings if flat else recordings / case.name, truth)
+        names.append(case.name)
+    return names
 
 
 def _mapping(recordings: Mapping[str, Mapping[str, Array]], stated: Mapping[str, float]) -> str:

@@ -6,13 +6,13 @@ starts with each recording, as if each were the first after the gearbox was set 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from diagnosis.proof.cases.case_files import case_names, staged_folders, write_case
+from diagnosis.proof.cases.case_files import CaseFiles, case_names, files_of_recordings, staged_folders, write_cases
 from diagnosis.proof.cases.concealed_case import CONTROLS, FAULTS, ConcealedCase, Plan
 from diagnosis.proof.cases.truth import truth_of
 from diagnosis.proof.plant.cycles import Programme, ambient, ornstein_uhlenbeck, programmes
@@ -163,42 +163,24 @@ def conceal(
     recordings, truth = Path(folder, "recordings"), Path(folder, "truth")
     plan = Plan(group="single", effects=(effect,), strength=strength)
     with staged_folders(recordings, truth) as (stage, truth_stage):
-        conceal_set(gearbox, [plan], seed=seed, recordings=stage, truth=truth_stage, flat=True)
+        write_cases(conceal_set(gearbox, [plan], seed=seed), stage, truth_stage, flat=True)
     return tuple(sorted(recordings.glob("*.csv.gz")))
 
 
 def conceal_set(
-    gearbox: Gearbox,
-    plans: Sequence[Plan],
-    *,
-    seed: int,
-    recordings: Path,
-    truth: Path,
-    flat: bool = False,
-    progress: Callable[[int, int], None] | None = None,
-) -> list[str]:
-    """Draw, simulate and record cases.
+    gearbox: Gearbox, plans: Sequence[Plan], *, seed: int, progress: Callable[[int, int], None] | None = None
+) -> Iterator[CaseFiles]:
+    """Draw, simulate and record cases, :data:`TOGETHER` at once.
 
     Parameters
     ----------
-    recordings : Path
-        Folder that gets one folder per case
-    truth : Path
-        Folder that gets ``<case>.json`` with the concealed effects; another one, see :func:`staged_folders`
-    flat : bool
-        True to write the recordings of a single case straight into `recordings`
     progress : callable or None
         Called with the amounts of work done and in all
-
-    Returns
-    -------
-    list of str
-        Names of the cases, in order
 
     Raises
     ------
     InputError
-        If an effect is not known, or a folder cannot be written to.
+        If an effect is not known.
     """
     plant = Plant(gearbox)
     cases = [draw_case(plant, plan, seed=(seed, i), name=name)
@@ -223,9 +205,8 @@ def conceal_set(
                 )
                 for k, (run, outcome) in enumerate(zip(case.runs, by_twin[0], strict=True))
             }
-            folder, facts = recordings if flat else recordings / case.name, truth_of(plant, case, by_twin)
-            write_case(folder, truth / f"{case.name}.json", columns, facts, case.instruments.stated)
-    return [case.name for case in cases]
+            files = files_of_recordings(columns, case.instruments.stated)
+            yield CaseFiles(name=case.name, files=files, truth=truth_of(plant, case, by_twin))
 
 
 def twins(case: ConcealedCase) -> list[tuple[Concealed, ...]]:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from diagnosis.proof.cases.case_files import case_names, write_files
+from diagnosis.proof.cases.case_files import CaseFiles, case_names
 from diagnosis.proof.cases.time_course import FORMS, Form
 from diagnosis.proof.cases.truth import size_of, size_of_heat
 from diagnosis.proof.injection.calibrated_model import CalibratedModel, calibrate
@@ -192,17 +191,9 @@ class Injector:
 
 
 def inject_set(
-    injector: Injector,
-    wish: Wish,
-    number: int,
-    *,
-    seed: int,
-    recordings: Path,
-    truth: Path,
-    flat: bool,
-    progress: Callable[[int, int], None] | None = None,
-) -> list[str]:
-    """Write recordings with an injection each, and the truth.
+    injector: Injector, wish: Wish, number: int, *, seed: int, progress: Callable[[int, int], None] | None = None
+) -> Iterator[CaseFiles]:
+    """Make recordings with an injection each.
 
     Parameters
     ----------
@@ -210,36 +201,26 @@ def inject_set(
         Of every case
     number : int
         Cases
-    recordings, truth : Path
-        Folders; with `flat` the recording lies in the first itself, else in a folder per case
     progress : callable or None
         Called with (cases done, cases in all)
-
-    Returns
-    -------
-    list of str
-        Names of the cases
 
     Raises
     ------
     InputError
-        If the wish cannot be fulfilled, or something cannot be written.
+        If the wish cannot be fulfilled.
     """
     injector.check(wish)
-    names = case_names(number)
-    for k, name in enumerate(names):
-        folder = recordings if flat else recordings / name
-        rng = np.random.default_rng([seed, k])
-        found = None if wish.control else injector.draw(wish, rng)
+    real = injector.real
+    for k, name in enumerate(case_names(number)):
+        found = None if wish.control else injector.draw(wish, np.random.default_rng([seed, k]))
         columns = {} if found is None else {q: values[found[1]] for q, values in found[0].columns.items()}
+        files = {f"{real.stem}.csv.gz": real.with_shifts(columns).compressed}
+        if real.mapping is not None:
+            files[real.mapping.name] = real.mapping.read_bytes()
         facts = truth_of(injector, found) | {"case": name, "seed": [seed, k]}
-        files = {f"{injector.real.stem}.csv.gz": injector.real.with_shifts(columns).compressed}
-        if injector.real.mapping is not None:
-            files[injector.real.mapping.name] = injector.real.mapping.read_bytes()
-        write_files(folder, files, truth / f"{name}.json", facts)
+        yield CaseFiles(name=name, files=files, truth=facts)
         if progress is not None:
             progress(k + 1, number)
-    return names
 
 
 def truth_of(injector: Injector, found: tuple[Trial, int] | None) -> dict[str, Any]:

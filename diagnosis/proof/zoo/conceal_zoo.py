@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from diagnosis.proof.cases.case_files import case_names, write_case
+from diagnosis.proof.cases.case_files import DEFINITION, CaseFiles, case_names, files_of_recordings
 from diagnosis.proof.cases.conceal import drawn_counts
 from diagnosis.proof.zoo.case import BASELINE, CONTROLS, GROUPS, ZooCase, ZooPlan
 from diagnosis.proof.zoo.draw import draw_case
@@ -78,63 +78,32 @@ def random_zoo_plans(
 def conceal_zoo(
     plans: Sequence[ZooPlan],
     *,
-    recordings: Path,
-    truth: Path,
-    flat: bool = False,
     baselines: int = 0,
     session_deviation: float | None = None,
     progress: Callable[[int, int], None] | None = None,
-) -> list[str]:
-    """Draw, simulate and record cases of the zoo.
+) -> Iterator[CaseFiles]:
+    """Draw, simulate and record cases of the zoo; further arguments as of :func:`~diagnosis.proof.zoo.draw.draw_case`.
 
     Parameters
     ----------
-    recordings : Path
-        Folder that gets one folder per case
-    truth : Path
-        Folder that gets ``<case>.json``; another one, see :func:`~diagnosis.proof.cases.case_files.staged_folders`
-    flat : bool
-        True to write the recordings of a single case straight into `recordings`
-    baselines : int
-        Healthy recordings of every plant, ``baseline_1.csv.gz`` ...
-    session_deviation : float or None
-        Standard deviation of the logarithm of every parameter between sessions; drawn if None
     progress : callable or None
         Called with the cases done and in all
-
-    Returns
-    -------
-    list of str
-        Names of the cases, in order
-
-    Raises
-    ------
-    InputError
-        If a definition cannot be split, or a folder cannot be written to.
     """
-    names = case_names(len(plans))
-    for done, (name, plan) in enumerate(zip(names, plans, strict=True), start=1):
-        case = draw_case(plan, name=name, baselines=baselines, session_deviation=session_deviation)
-        write_zoo_case(case, recordings if flat else recordings / case.name, truth / f"{case.name}.json")
+    for done, (name, plan) in enumerate(zip(case_names(len(plans)), plans, strict=True), start=1):
+        yield files_of_case(draw_case(plan, name=name, baselines=baselines, session_deviation=session_deviation))
         if progress is not None:
             progress(done, len(plans))
-    return names
 
 
-def write_zoo_case(case: ZooCase, folder: Path, truth_file: Path | None) -> None:
-    """Write recordings and nominal definition of a case into a folder, and its truth into a file outside it.
-
-    Raises
-    ------
-    InputError
-        If something cannot be written.
-    """
+def files_of_case(case: ZooCase) -> CaseFiles:
+    """Recordings and nominal definition of a case, and its truth."""
     machine = case.plan.machine
     gearbox = load_gearbox(machine)
     source = Path(machine) if names_a_file(machine) else packaged(FOLDER, machine)
     columns = {name: one.quantity.column for name, one in gearbox.network().inputs.items()}
-    truth = {} if truth_file is None else truth_of(case, gearbox.hash, columns)
-    write_case(folder, truth_file, record_case(case, columns), truth, case.instruments.stated, read_text(source))
+    recordings = files_of_recordings(record_case(case, columns), case.instruments.stated)
+    files = {**recordings, DEFINITION: read_text(source).encode()}
+    return CaseFiles(name=case.name, files=files, truth=truth_of(case, gearbox.hash, columns))
 
 
 def record_case(case: ZooCase, columns: Mapping[str, str]) -> dict[str, dict[str, Array]]:

@@ -13,6 +13,7 @@ import pytest
 from click.testing import CliRunner
 
 from builder.commands.conceal import conceal
+from diagnosis.proof.cases.case_files import write_cases
 from diagnosis.proof.cases.conceal import EFFECTS, PHYSICS, conceal_set, mixed_plans, random_plans
 from diagnosis.proof.cases.concealed_case import CONTROLS, FAULTS, Plan
 from diagnosis.proof.plant import cycles
@@ -42,7 +43,7 @@ def short_programmes() -> Iterator[None]:
 def cases(fzg: Gearbox, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The cases of PLANS on disk, in the folders ``recordings`` and ``truth``."""
     folder = tmp_path_factory.mktemp("cases")
-    conceal_set(fzg, PLANS, seed=3, recordings=folder / "recordings", truth=folder / "truth")
+    write_cases(conceal_set(fzg, PLANS, seed=3), folder / "recordings", folder / "truth")
     return folder
 
 
@@ -63,7 +64,7 @@ def test_recordings_are_readable_and_contain_no_truth(fzg: Gearbox, cases: Path)
 
 
 def test_same_seed_same_bytes_independent_of_other_cases(fzg: Gearbox, cases: Path, tmp_path: Path) -> None:
-    conceal_set(fzg, PLANS[:1], seed=3, recordings=tmp_path / "r", truth=tmp_path / "t", flat=True)
+    write_cases(conceal_set(fzg, PLANS[:1], seed=3), tmp_path / "r", tmp_path / "t", flat=True)
     for path in (cases / "recordings" / "case_001").iterdir():
         assert path.read_bytes() == (tmp_path / "r" / path.name).read_bytes(), path.name
     assert (cases / "truth" / "case_001.json").read_bytes() == (tmp_path / "t" / "case_001.json").read_bytes()

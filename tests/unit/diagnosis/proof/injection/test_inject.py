@@ -13,6 +13,7 @@ import pytest
 from click.testing import CliRunner
 
 from builder.commands.conceal import conceal
+from diagnosis.proof.cases.case_files import write_cases
 from diagnosis.proof.cases.time_course import Course
 from diagnosis.proof.injection.control import Control, find_control
 from diagnosis.proof.injection.inject import KINDS, Injector, Wish, inject_set
@@ -36,10 +37,8 @@ def rod() -> Injector:
 
 def inject(injector: Injector, folder: Path, *, seed: int = 1, number: int = 1, **wish: object) -> tuple[dict, Path]:
     """Truth and recording of the first case."""
-    inject_set(
-        injector, Wish(**wish), number, seed=seed, recordings=folder / "recordings", truth=folder / "truth",
-        flat=number == 1,
-    )  # fmt: skip
+    cases = inject_set(injector, Wish(**wish), number, seed=seed)
+    write_cases(cases, folder / "recordings", folder / "truth", flat=number == 1)
     truth = json.loads((folder / "truth" / "case_001.json").read_text())
     return truth, folder / "recordings" / ("" if number == 1 else "case_001") / f"{injector.real.stem}.csv.gz"
 

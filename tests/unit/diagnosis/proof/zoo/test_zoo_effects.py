@@ -11,11 +11,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from diagnosis.proof.cases.case_files import write_case, write_cases
 from diagnosis.proof.cases.time_course import Course
 from diagnosis.proof.plant import cycles
 from diagnosis.proof.zoo import draw
 from diagnosis.proof.zoo.case import ZooCase, ZooPlan, run_case
-from diagnosis.proof.zoo.conceal_zoo import conceal_zoo, record_case, write_zoo_case, zoo_plans
+from diagnosis.proof.zoo.conceal_zoo import conceal_zoo, files_of_case, record_case, zoo_plans
 from diagnosis.proof.zoo.distance import Drawn
 from diagnosis.proof.zoo.effects import ZooEffect
 from diagnosis.proof.zoo.families import FAMILIES
@@ -200,7 +201,7 @@ def test_same_seed_same_bytes_and_healthy_baselines(
     monkeypatch.setattr(draw, "draw_plant", lambda *_, **__: drawn)
     plans = zoo_plans(5, {"sensor": 1}, families=["walls"], machine="fzg")
     for copy in ("a", "b"):
-        conceal_zoo(plans, recordings=tmp_path / copy / "r", truth=tmp_path / copy / "t", baselines=1)
+        write_cases(conceal_zoo(plans, baselines=1), tmp_path / copy / "r", tmp_path / copy / "t")
     files = sorted(path.relative_to(tmp_path / "a") for path in (tmp_path / "a").rglob("*.*"))
     assert "baseline_1.csv.gz" in {path.name for path in files}
     assert all((tmp_path / "a" / path).read_bytes() == (tmp_path / "b" / path).read_bytes() for path in files)
@@ -220,4 +221,4 @@ def test_baselines_share_the_plant_up_to_the_deviation(drawn: Drawn, fzg: Gearbo
 def test_a_folder_that_cannot_be_written_is_named(drawn: Drawn, fzg: Gearbox, tmp_path: Path) -> None:
     (tmp_path / "case").write_text("a file, no folder")
     with pytest.raises(InputError, match="case: cannot be written"):
-        write_zoo_case(case_of(drawn, fzg, "control"), tmp_path / "case", None)
+        write_case(files_of_case(case_of(drawn, fzg, "control")), tmp_path / "case", None)
