@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
+from pathlib import PurePath
 
 import numpy as np
 
 from diagnosis.proof.plant.cycles import ROW_S, ornstein_uhlenbeck
 from diagnosis.proof.zoo.structure import Body, Boundary, Law, Moment, Path, Probe, Source, ZooPlant
+from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 
 FARTHEST_SD = 2.0
@@ -18,18 +20,17 @@ class Builder:
 
     Parameters
     ----------
-    family, gearbox : str
-        Names of the family and of the nominal definition
+    family : str
+        Its name
+    gearbox : Gearbox
+        Nominal definition, of which names alone are read
     inputs : tuple of str
         Inputs of the nominal network that laws read
-    links : collection of str
-        Links of the nominal network by name, ``a-b``
     """
 
-    def __init__(
-        self, family: str, gearbox: str, inputs: tuple[str, ...], links: Collection[str], rng: np.random.Generator
-    ) -> None:
-        self.family, self.gearbox, self.inputs, self.links, self.rng = family, gearbox, inputs, links, rng
+    def __init__(self, family: str, gearbox: Gearbox, inputs: tuple[str, ...], rng: np.random.Generator) -> None:
+        self.family, self.gearbox, self.inputs, self.rng = family, PurePath(gearbox.file).stem, inputs, rng
+        self.links = frozenset(link.name for link in gearbox.network().links)
         self.bodies: list[Body] = []
         self.boundaries: list[Boundary] = []
         self.paths: list[Path] = []

@@ -24,6 +24,12 @@ def _rayleigh(T: Array, T_a: Array, L: float) -> tuple[Array, Array, Array]:
     return Ra, nu, k
 
 
+def _free_plate(T: Array, T_a: Array, L: float) -> tuple[Array, Array, Array]:
+    """Nusselt number of free convection of a vertical plate (Churchill and Chu 1975), and of the air nu and k."""
+    Ra, nu, k = _rayleigh(T, T_a, L)
+    return (0.825 + 0.387 * Ra ** (1.0 / 6.0) / (1.0 + (0.492 / PRANDTL) ** 0.5625) ** (8.0 / 27.0)) ** 2, nu, k
+
+
 def churchill_chu(T: Array, T_a: Array, v: Array, L: float) -> Array:
     """Free convection of a vertical plate after Churchill and Chu, forced of a laminar plate, cubes added, [W/(m2 K)].
 
@@ -31,8 +37,7 @@ def churchill_chu(T: Array, T_a: Array, v: Array, L: float) -> Array:
     ----------
     Churchill, Chu, Int. J. Heat Mass Transfer 18 (1975); 5.2 at 60/27 degC, 0.215 m. Laminar plate 0.664 Re^0.5.
     """
-    Ra, nu, k = _rayleigh(T, T_a, L)
-    free = (0.825 + 0.387 * Ra ** (1.0 / 6.0) / (1.0 + (0.492 / PRANDTL) ** 0.5625) ** (8.0 / 27.0)) ** 2
+    free, nu, k = _free_plate(T, T_a, L)
     forced = 0.664 * np.sqrt(v * L / nu) * PRANDTL ** (1.0 / 3.0)
     return np.asarray((free**3 + forced**3) ** (1.0 / 3.0) * k / L)
 
@@ -44,8 +49,7 @@ def gnielinski_plate(T: Array, T_a: Array, v: Array, L: float) -> Array:
     ----------
     VDI heat atlas, G4; 16.2 at 2 m/s, 60/27 degC, 0.215 m.
     """
-    Ra, nu, k = _rayleigh(T, T_a, L)
-    free = (0.825 + 0.387 * Ra ** (1.0 / 6.0) / (1.0 + (0.492 / PRANDTL) ** 0.5625) ** (8.0 / 27.0)) ** 2
+    free, nu, k = _free_plate(T, T_a, L)
     Re = np.maximum(v * L / nu, 1.0)
     laminar = 0.664 * np.sqrt(Re) * PRANDTL ** (1.0 / 3.0)
     turbulent = 0.037 * Re**0.8 * PRANDTL / (1.0 + 2.443 * Re**-0.1 * (PRANDTL ** (2.0 / 3.0) - 1.0))

@@ -5,9 +5,9 @@ Bodies are named after the nominal node that they are a piece of: ``housing_lowe
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from itertools import pairwise
-from pathlib import PurePath
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from diagnosis.proof.zoo.families.sizes import Sizes
 from diagnosis.proof.zoo.structure import Law, Moment, ZooPlant, constant
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
+from models.definition.bearing_section import Bearing
 
 OIL_TO_WALL = 0.4  # share of the oil's heat transfer that is left at rest
 SPAN_H = 80.0  # of a wandering draught before it repeats
@@ -36,9 +37,7 @@ class _Gearbox:
 
     def __init__(self, family: str, gearbox: Gearbox, design: Design, rng: np.random.Generator) -> None:
         self.sizes, self.design = Sizes(gearbox), design
-        name = PurePath(gearbox.file).stem
-        inputs = ("speed", "torque", "T_ambient", "air_speed")
-        self.b = Builder(family, name, inputs, frozenset(self.sizes.nominal_links()), rng)
+        self.b = Builder(family, gearbox, ("speed", "torque", "T_ambient", "air_speed"), rng)
         self.gearbox, self.oil = gearbox, gearbox.lubricant()
         self.n_ref, self.M_ref = self.sizes.reference
         self.parts = [part.name for part in gearbox.housing.part]
@@ -262,7 +261,7 @@ class _Gearbox:
         root = self.at[shaft][seats[0]] if seats else self.at[shaft]["middle"]
         length = section.length_in_air or b.uniform(0.3, 1.2) * d
         stub = section.conductivity_W_mK * np.pi / 4.0 * d**2 / (0.5 * length + d)
-        ratio = self.sizes.ratio(shaft)
+        ratio = self.gearbox.speed_ratio[shaft]
 
         def law(area: float, diameter: float) -> Law:
             return lambda m: films.shaft_end(_speed(m) * ratio * RPM, diameter, m.T[AIR]) * area
@@ -398,32 +397,31 @@ class _Gearbox:
         b.source("churning", "churning", churning, into, 0.2)
 
     def _bearing_losses(self) -> None:
-        b, sizes = self.b, self.sizes
+        b = self.b
         f_0, f_1 = b.uniform(2.2, 4.0), b.uniform(2e-4, 4e-4)
         R_1, mu_bl = b.uniform(0.9, 1.3) * 1e-6, b.uniform(0.05, 0.13)
         for bearing in self.gearbox.bearing:
-            name, ratio, share = bearing.name, sizes.ratio(bearing.shaft), float(bearing.load_share or 0.0)
-            self._bearing_loss(name, ratio, share, (f_0, f_1, R_1, mu_bl))
+            if self.design.bearing == "palmgren":
+                self._bearing_loss(bearing, partial(losses.bearing_palmgren, bearing, f_0=f_0, f_1=f_1), 500.0)
+            else:
+                self._bearing_loss(bearing, partial(losses.bearing_skf, bearing, R_1=R_1, mu_bl=mu_bl), np.inf)
 
-    def _bearing_loss(self, name: str, ratio: float, share: float, numbers: tuple[float, float, float, float]) -> None:
-        oil, r_b, roller = self.oil, self.sizes.pair.r_b[0], self.sizes.roller(name)
+    def _bearing_loss(self, bearing: Bearing, law: Callable[[Array, Array, Array], Array], thickest: float) -> None:
+        """Loss by a law of speed, force and viscosity, which is held at `thickest`, [mm^2/s]."""
+        oil, r_b, name = self.oil, self.sizes.pair.r_b[0], bearing.name
+        ratio, share = self.gearbox.speed_ratio[bearing.shaft], float(bearing.load_share or 0.0)
         inner, outer, sump = self.at[name]["inner"], self.at[name]["outer"], self.at["oil"]["sump"]
-        f_0, f_1, R_1, mu_bl = numbers
-        palmgren = self.design.bearing == "palmgren"
 
         def power(m: Moment) -> Array:
-            nu = oil.kinematic_viscosity(0.5 * (m.T[inner] + m.T[sump]))
-            n, F = _speed(m) * ratio, np.abs(m.inputs["torque"]) / r_b * share
-            if palmgren:
-                return losses.bearing_palmgren(roller, n, F, np.minimum(nu, 500.0), f_0=f_0, f_1=f_1)
-            return losses.bearing_skf(roller, n, F, nu, R_1=R_1, mu_bl=mu_bl)
+            nu = np.minimum(oil.kinematic_viscosity(0.5 * (m.T[inner] + m.T[sump])), thickest)
+            return law(_speed(m) * ratio, np.abs(m.inputs["torque"]) / r_b * share, nu)
 
         into = {inner: 1.0} if inner == outer else {inner: 0.5, outer: 0.5}
         self.b.source(name, name, power, into, 0.12)
 
     def _seal_loss(self, name: str, shaft: str, d_mm: float) -> None:
         design, sump, nu_40 = self.design, self.at["oil"]["sump"], self.oil.nu_40
-        ratio = self.sizes.ratio(shaft)
+        ratio = self.gearbox.speed_ratio[shaft]
 
         def power(m: Moment) -> Array:
             n = _speed(m) * ratio

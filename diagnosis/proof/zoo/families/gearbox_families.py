@@ -9,13 +9,14 @@ from collections.abc import Callable
 
 import numpy as np
 
+from diagnosis.proof.plant.sizes import refuse_unbuilt
 from diagnosis.proof.zoo.families import films, losses
 from diagnosis.proof.zoo.families.design import Design
 from diagnosis.proof.zoo.families.family import Family
 from diagnosis.proof.zoo.families.gearbox import build_gearbox
-from diagnosis.proof.zoo.families.sizes import refuse_unsplit
 from diagnosis.proof.zoo.structure import ZooPlant
 from models.assembly.gearbox import Gearbox
+from models.base.errors import InputError
 
 MACHINES = ("fzg", "conveyor")
 GEARBOX_FAMILIES: list[Family] = []
@@ -28,7 +29,12 @@ def _family(name: str, description: str) -> Callable[[DrawDesign], DrawDesign]:
 
     def enter(draw_design: DrawDesign) -> DrawDesign:
         def draw(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
-            refuse_unsplit(gearbox)
+            if gearbox.is_parametric:
+                raise InputError(
+                    f"{gearbox.file}: has no geometry; this family splits gearboxes with teeth, shafts and bearings: "
+                    "name a family for definitions without geometry"
+                )
+            refuse_unbuilt(gearbox)
             return build_gearbox(name, gearbox, draw_design(gearbox, rng), rng)
 
         GEARBOX_FAMILIES.append(Family(name=name, description=description, machines=MACHINES, draw=draw))

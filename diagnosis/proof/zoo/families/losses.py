@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.base.types import Array
+from models.definition.bearing_section import Bearing
 
 GRAVITY = 9.80665
 RPM = np.pi / 30.0
@@ -241,23 +242,7 @@ def churning_mauz(e: tuple[float, float], b: float, v_t: Array, omega_2: Array, 
 # ---------------------------------------------------------------------- bearings and seals
 
 
-@dataclass(frozen=True, kw_only=True)
-class Roller:
-    """A cylindrical roller bearing.
-
-    Attributes
-    ----------
-    d_m, bore, outside, width : float
-        [mm]
-    """
-
-    d_m: float
-    bore: float
-    outside: float
-    width: float
-
-
-def bearing_palmgren(roller: Roller, n: Array, F_r: Array, nu: Array, *, f_0: float, f_1: float) -> Array:
+def bearing_palmgren(bearing: Bearing, n: Array, F_r: Array, nu: Array, *, f_0: float, f_1: float) -> Array:
     """Palmgren / ISO/TR 14179-2: ``M_0 + M_1``, [W], n in 1/min.
 
     ``M_0 = 1e-7 f_0 (nu n)^(2/3) d_m^3`` for nu n >= 2000, ``160e-7 f_0 d_m^3`` below; ``M_1 = f_1 F_r d_m``, N mm.
@@ -267,13 +252,13 @@ def bearing_palmgren(roller: Roller, n: Array, F_r: Array, nu: Array, *, f_0: fl
     Harris, "Rolling Bearing Analysis"; Palmgren 1959. From memory; verified by M_0 = 57.06 N mm at d_m 60, f_0 2,
     nu 32, 1500 1/min.
     """
-    product = nu * n
-    M_0 = 1e-7 * f_0 * np.maximum(product, 2000.0) ** (2.0 / 3.0) * roller.d_m**3
-    M_1 = f_1 * F_r * roller.d_m
+    d_m = 0.5 * (bearing.bore_mm + bearing.outside_diameter_mm)
+    M_0 = 1e-7 * f_0 * np.maximum(nu * n, 2000.0) ** (2.0 / 3.0) * d_m**3
+    M_1 = f_1 * F_r * d_m
     return np.asarray((M_0 + M_1) * 1e-3 * n * RPM)
 
 
-def bearing_skf(roller: Roller, n: Array, F_r: Array, nu: Array, *, R_1: float, mu_bl: float) -> Array:
+def bearing_skf(bearing: Bearing, n: Array, F_r: Array, nu: Array, *, R_1: float, mu_bl: float) -> Array:
     """SKF, rolling and sliding of a cylindrical roller bearing without drag, [W], n in 1/min.
 
     References
@@ -281,10 +266,11 @@ def bearing_skf(roller: Roller, n: Array, F_r: Array, nu: Array, *, R_1: float, 
     SKF, "Rolling bearings" (2018), with S_2 = 0.0015, K_rs = 3e-8, K_Z = 5.1; verified by 127.1 and 9.4 N mm at
     NU 406, 2165.7 1/min, 4463 N, 15.41 mm2/s.
     """
-    d_m, product = roller.d_m, np.maximum(nu * n, 1e-6)
+    bore, outside = bearing.bore_mm, bearing.outside_diameter_mm
+    d_m, product = 0.5 * (bore + outside), np.maximum(nu * n, 1e-6)
     F = np.maximum(F_r, 15.0)
     inlet = 1.0 / (1.0 + 1.84e-9 * (n * d_m) ** 1.28 * nu**0.64)
-    span = (roller.bore + roller.outside) * np.sqrt(5.1 / (2.0 * (roller.outside - roller.bore)))
+    span = (bore + outside) * np.sqrt(5.1 / (2.0 * (outside - bore)))
     starved = np.exp(-3e-8 * product * span)
     M_rr = inlet * starved * R_1 * d_m**2.41 * F**0.31 * product**0.6
     boundary = np.exp(-2.6e-8 * product**1.4 * d_m)

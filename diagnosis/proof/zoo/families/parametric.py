@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import PurePath
 
 import numpy as np
 import sympy as sp
@@ -124,9 +123,7 @@ class _Machine:
             raise InputError(
                 f"{gearbox.file}: [torque] follows from a power; the zoo needs a recorded torque: name another machine"
             )
-        links = frozenset(f"{a}-{c}" for a, c in (link.between for link in self.definition.link))
-        name = PurePath(gearbox.file).stem
-        self.b = Builder(family, name, tuple(self.definition.inputs), links, rng)
+        self.b = Builder(family, gearbox, tuple(self.definition.inputs), rng)
         self.capacity = {part.name: part.heat_capacity_J_K for part in self.definition.part}
         self.input_of = {boundary.name: boundary.input for boundary in self.definition.boundary}
         self.core: dict[str, str] = {}
