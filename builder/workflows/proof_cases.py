@@ -108,7 +108,6 @@ def add_evidence_of_case(file: Path, gearbox: Gearbox, plan: Plan, seed: tuple[i
     design = design_of_own_kind(plant, case.individual, case.runs, case.instruments)
     pairs = list(zip(facts["effects"], case.effects, strict=True))
     for fact, effect in pairs[:1] if plan.group == "messy" else pairs:
-        nats = design.nats_of(effect_on_readings(plant, case.runs, case.instruments, [effect]))
-        fact["oracle"] = {"D_plant_nats": round(nats.plant, 2), "D_tool_nats": round(nats.tool, 2)}
+        fact["oracle"] = design.nats_of(effect_on_readings(plant, case.runs, case.instruments, [effect])).facts
     with atomic_file(file) as partial:
         partial.write_text(json.dumps(facts, indent=1, sort_keys=True) + "\n", encoding="utf-8")

@@ -151,4 +151,5 @@ def _csv(columns: Mapping[str, Array]) -> bytes:
 
 
 def _texts(values: Array, decimals: int) -> list[str]:
-    return ["" if missing else f"{value:.{decimals}f}" for value, missing in zip(values, np.isnan(values), strict=True)]
+    pairs = zip(np.round(values, decimals), np.isnan(values), strict=True)
+    return ["" if missing else f"{value:.{decimals}f}" for value, missing in pairs]

@@ -49,9 +49,9 @@ class ConcealedCase:
     @property
     def physics(self) -> tuple[Concealed, ...]:
         """Effects that act in the plant."""
-        return tuple(effect for effect in self.effects if effect.effect.name not in FAULTS)
+        return tuple(effect for effect in self.effects if not effect.is_fault)
 
     @property
     def faults(self) -> tuple[Concealed, ...]:
         """Effects that act in the measurement."""
-        return tuple(effect for effect in self.effects if effect.effect.name in FAULTS)
+        return tuple(effect for effect in self.effects if effect.is_fault)

@@ -12,6 +12,7 @@ from diagnosis.proof.plant.anatomy import MESH, OIL, SPLASH, SUMP
 from diagnosis.proof.plant.plant import Moment, Plant
 from models.base.types import Array
 
+MEASUREMENT = "measurement"
 Kind = Literal["source", "link", "loss_factor", "link_factor", "signal", "sensor", "parameter"]
 Hook = Callable[["Grip"], None]
 Places = Callable[[Plant, np.random.Generator], tuple[str, ...]]
@@ -56,6 +57,11 @@ class Concealed:
     places: tuple[str, ...]
     parameters: Mapping[str, float]
     strength: float
+
+    @property
+    def is_fault(self) -> bool:
+        """True if it acts in the measurement, not in the plant."""
+        return self.effect.family == MEASUREMENT
 
     @property
     def key(self) -> str:

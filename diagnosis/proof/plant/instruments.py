@@ -10,12 +10,10 @@ from scipy.signal import lfilter, lfiltic
 
 from diagnosis.proof.plant.cycles import ROW_S, reference_torque
 from diagnosis.proof.plant.draws import at, either, one_of, relative
-from diagnosis.proof.plant.effect import Concealed, Draw, Effect, Kind, Places
+from diagnosis.proof.plant.effect import MEASUREMENT, Concealed, Draw, Effect, Kind, Places
 from diagnosis.proof.plant.plant import Plant
 from diagnosis.proof.plant.plant_run import Outcome, Run
 from models.base.types import Array
-
-DECIMALS = {"speed_rpm": 1, "torque_Nm": 2, "T_ambient_degC": 1, "air_speed_m_s": 1, "P_loss_W": 1}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,7 +94,7 @@ def record(
     faults : sequence of Concealed
         Faults of measurement, of :data:`SENSOR_EFFECTS`
     rng : numpy.random.Generator or None
-        None for readings without noise, steps and dropouts
+        None for readings without noise, steps and dropouts; other columns get their steps where they become text
 
     Returns
     -------
@@ -127,14 +125,9 @@ def record(
     for fault in faults:
         _hold_readings(fault, readings)
     temperatures = {f"T_{place}_degC": values for place, values in readings.items()}
-    columns: dict[str, Array] = {"time_s": time, **inputs, **temperatures, "P_loss_W": loss}
     if rng is not None:
-        for name, values in columns.items():
-            decimals = DECIMALS.get(name)
-            columns[name] = values if decimals is None else np.asarray(np.round(values, decimals))
-        temperatures = {f"T_{place}_degC": columns[f"T_{place}_degC"] for place in readings}
         drop_readings(temperatures, instruments.dropouts, rng)
-    return columns
+    return {"time_s": time, **inputs, **temperatures, "P_loss_W": loss}
 
 
 def lagged(values: Array, tau_s: float, row_s: float = ROW_S) -> Array:
@@ -222,7 +215,7 @@ def _stuck(_: Plant, rng: np.random.Generator, strength: float) -> Mapping[str, 
 
 
 def _fault(name: str, places: Places, draw: Draw, law: str, kind: Kind = "sensor") -> Effect:
-    return Effect(name, kind, places, draw, law, family="measurement")
+    return Effect(name, kind, places, draw, law, family=MEASUREMENT)
 
 
 SENSOR_EFFECTS = (

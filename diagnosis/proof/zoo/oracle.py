@@ -41,6 +41,11 @@ class OracleNats:
     plant: float
     tool: float
 
+    @property
+    def facts(self) -> dict[str, float]:
+        """Evidence by the keys of the truth."""
+        return {"D_plant_nats": round(self.plant, 2), "D_tool_nats": round(self.tool, 2)}
+
 
 @dataclass(frozen=True, kw_only=True)
 class RecordingColumns:

@@ -10,7 +10,7 @@ import numpy as np
 from diagnosis.proof.plant.anatomy import AIR, FRAME, OIL, SPLASH, SUMP
 from diagnosis.proof.plant.cycles import Programme
 from diagnosis.proof.plant.effect import Concealed
-from diagnosis.proof.plant.instruments import SENSOR_EFFECTS, OwnInstruments, record
+from diagnosis.proof.plant.instruments import OwnInstruments, record
 from diagnosis.proof.plant.laws import Laws
 from diagnosis.proof.plant.plant import Moment as OwnMoment
 from diagnosis.proof.plant.plant import Plant
@@ -20,15 +20,9 @@ from diagnosis.proof.zoo.oracle_columns import design_of
 from diagnosis.proof.zoo.simulate import simulate
 from diagnosis.proof.zoo.structure import Body, Boundary, Law, Moment, Path, Probe, Source, Variant, ZooPlant
 from models.base.types import Array
+from models.quantities.quantities import column_of_input
 
 MOMENTS_KEPT = 30
-FAULTS = {effect.name for effect in SENSOR_EFFECTS}
-INPUT_COLUMNS = {
-    "speed": "speed_rpm",
-    "torque": "torque_Nm",
-    "T_ambient": "T_ambient_degC",
-    "air_speed": "air_speed_m_s",
-}
 
 
 def design_of_own_kind(
@@ -57,8 +51,8 @@ def effect_on_readings(
     list of mappings of channel to Array, shape (rows,)
     """
     train = [run for run in runs if run.programme.name.startswith("train")]
-    physics = tuple(effect for effect in effects if effect.effect.name not in FAULTS)
-    faults = [effect for effect in effects if effect.effect.name in FAULTS]
+    physics = tuple(effect for effect in effects if not effect.is_fault)
+    faults = [effect for effect in effects if effect.is_fault]
     twins = [replace(run, effects=kept) for run in train for kept in (physics, ())]
     outcomes = run_plant(plant, twins)
     found: list[Mapping[str, Array]] = []
@@ -67,7 +61,7 @@ def effect_on_readings(
         sound = record(plant, run, outcomes[2 * k + 1], instruments, (), None)
         names = {f"T_{place}_degC": place for place in instruments.channels} | {"P_loss_W": LOSS}
         x = {channel: spoiled[column] - sound[column] for column, channel in names.items()}
-        wrong = {name: spoiled[column] - sound[column] for name, column in INPUT_COLUMNS.items()}
+        wrong = {name: spoiled[column_of_input(name)] - sound[column_of_input(name)] for name in INPUTS}
         if any(np.any(error != 0.0) for error in wrong.values()):
             predicted = _by_wrong_inputs(plant, run, instruments, wrong)
             x = {channel: values + predicted[channel] for channel, values in x.items()}

@@ -122,7 +122,7 @@ def record(
     made = {"time_s": np.asarray(np.arange(rows) * measured.row_s), **inputs}
     made |= {f"T_{name}_degC": values for name, values in readings.items()}
     if instruments.loss_noise is not None:
-        made["P_loss_W"] = np.round(sound.P_loss + instruments.noise_of_loss(sound.P_loss, rng), 1)
+        made["P_loss_W"] = sound.P_loss + instruments.noise_of_loss(sound.P_loss, rng)
     return made
 
 

@@ -7,22 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.proof.cases.truth import (
-    SCHEMA,
-    SETS,
-    facts_of_fault,
-    facts_of_heat,
-    facts_of_noise,
-    sizes_of,
-)
+from diagnosis.proof.cases.truth import SCHEMA, SETS, facts_of_fault, facts_of_heat, facts_of_noise, sizes_of
 from diagnosis.proof.zoo.case import ZooCase
 from diagnosis.proof.zoo.effects import ZooEffect
 from diagnosis.proof.zoo.faults import Fault, spoiled
-from diagnosis.proof.zoo.oracle import OracleNats
 from diagnosis.proof.zoo.recorder import measure
 from diagnosis.proof.zoo.setting import Changed
 from diagnosis.proof.zoo.structure import Change, Outcome, ZooPlant
 from models.base.types import Array
+
+NO_NATS = {"D_plant_nats": None, "D_tool_nats": None}  # evidence where nothing is concealed
 
 
 def truth_of(case: ZooCase, gearbox_hash: str, columns: Mapping[str, str]) -> dict[str, Any]:
@@ -61,7 +55,7 @@ def truth_of(case: ZooCase, gearbox_hash: str, columns: Mapping[str, str]) -> di
         "effects": facts,
         "changed": [one for fact in facts for one in fact["changed"]],
         "visible": case.visible,
-        "oracle": {**_nats(case.nats), "distance_K": round(case.distance_K, 4)},
+        "oracle": {**(NO_NATS if case.nats is None else case.nats.facts), "distance_K": round(case.distance_K, 4)},
         "rejected_plants": case.rejected,
         "K_all": _kelvin(case, 0),
         "base_parameters": {name: float(f"{value:.6g}") for name, value in case.plant.parameters.items()},
@@ -86,13 +80,6 @@ def truth_of(case: ZooCase, gearbox_hash: str, columns: Mapping[str, str]) -> di
     }
 
 
-def _nats(nats: OracleNats | None) -> dict[str, float | None]:
-    """Evidence by the keys of the truth; null where nothing is concealed."""
-    if nats is None:
-        return {"D_plant_nats": None, "D_tool_nats": None}
-    return {"D_plant_nats": round(nats.plant, 2), "D_tool_nats": round(nats.tool, 2)}
-
-
 def _effect(case: ZooCase, k: int, columns: Mapping[str, str]) -> dict[str, Any]:
     effect = case.effects[k]
     facts: dict[str, Any] = {
@@ -107,7 +94,7 @@ def _effect(case: ZooCase, k: int, columns: Mapping[str, str]) -> dict[str, Any]
         "strength": round(effect.strength, 6),
         "cap": round(effect.cap, 6),
         "parameters": {"a": round(effect.strength, 6)} | {n: round(v, 6) for n, v in effect.parameters.items()},
-        "oracle": _nats(case.nats_of_effects[k]),
+        "oracle": case.nats_of_effects[k].facts,
         "changed": [_changed(case, effect, one) for one in effect.changed],
     }
     if effect.fault is not None:
