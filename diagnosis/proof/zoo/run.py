@@ -6,7 +6,7 @@ Laws are taken at the middle of every step, temperatures extrapolated to it, as 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.signal import lfilter
@@ -20,23 +20,33 @@ from models.base.types import Array
 LONGEST_STEP_S = 200.0
 
 
-@dataclass(frozen=True, kw_only=True)
-class HeatBalance:
-    """Heat of a whole run, rows before the recording included, shape (B,) each, [J].
+class Clock:
+    """Rows and steps of a programme.
 
     Attributes
     ----------
-    stored : Array
-        In the bodies at the end, less that at the start
-    given : Array
-        By sources, random heats and changes
-    shed : Array
-        Left through boundaries
+    at_rows, in_steps : Moment
+        Times and inputs of all rows, and of the middles of all steps; temperatures and parameters are still empty
+    random_heat : mapping of str to Array, shape (steps,)
+        By body, [W]
     """
 
-    stored: Array
-    given: Array
-    shed: Array
+    def __init__(self, plant: ZooPlant, programme: Programme) -> None:
+        self.plant, self.programme = plant, programme
+        self.rows = len(programme)
+        self.steps_per_row = max(1, round(plant.row_s / LONGEST_STEP_S))
+        self.dt = plant.row_s / self.steps_per_row
+        self.steps = (self.rows - 1) * self.steps_per_row
+        rows = np.arange(self.rows, dtype=float)
+        middles = (np.arange(self.steps) + 0.5) / self.steps_per_row
+        self.at_rows = self._moment(rows, programme.inputs)
+        self.in_steps = self._moment(middles, {n: np.interp(middles, rows, v) for n, v in programme.inputs.items()})
+        self.random_heat = {name: np.interp(middles, rows, values) for name, values in programme.random_heat.items()}
+
+    def _moment(self, row: Array, inputs: Mapping[str, Array]) -> Moment:
+        since = (row - self.programme.unrecorded) * self.plant.row_s / 3600.0
+        hours = np.maximum(self.programme.begins_h + since, 0.0)
+        return Moment(hours=hours, since_start=np.maximum(since, 0.0), inputs=inputs, T={}, p={})
 
 
 @dataclass(kw_only=True, eq=False)
@@ -45,52 +55,48 @@ class Run:
 
     Attributes
     ----------
-    T : Array, shape (rows, bodies, B)
-        [degC]
+    changes : list of Change
+        The different ones of all variants
     T_steps : Array, shape (steps + 1, bodies, B)
         [degC]
     made : list of Array, shape (rows, B)
         Heat of every different change in the step after a row, [W]
+    stored, given, shed : Array, shape (B,)
+        Heat of the whole run, [J]: in the bodies at the end less that at the start; by sources, random heats and
+        changes; left through boundaries
     """
 
-    T: Array
+    clock: Clock
+    laws: Laws
+    changes: list[Change]
     T_steps: Array
     made: list[Array]
-    balance: HeatBalance
+    stored: Array
+    given: Array
+    shed: Array
+
+    @property
+    def T(self) -> Array:
+        """Temperatures at the rows, shape (rows, bodies, B), [degC]."""
+        return self.T_steps[:: self.clock.steps_per_row]
+
+    def at_rows(self, b: int, variant: Variant) -> tuple[Moment, Array]:
+        """Moment of all rows of one run, and the values of all laws."""
+        ones, values = np.ones(self.clock.rows), {**self.laws.plant.parameters, **variant.parameters}
+        p = {name: value * ones for name, value in values.items()}
+        raw = replace(self.clock.at_rows, T=dict(zip(self.laws.bodies, self.T[:, :, b].T, strict=True)), p=p)
+        moment = feel(raw, [(change, slice(None)) for change in variant.changes])
+        return moment, self.laws.values(moment)
 
 
-class Clock:
-    """Steps of a programme and its inputs between them."""
-
-    def __init__(self, plant: ZooPlant, programme: Programme) -> None:
-        self.plant, self.programme = plant, programme
-        self.rows = len(programme)
-        self.steps_per_row = max(1, round(plant.row_s / LONGEST_STEP_S))
-        self.dt = plant.row_s / self.steps_per_row
-        self.steps = (self.rows - 1) * self.steps_per_row
-        at = np.arange(self.rows, dtype=float)
-        middle = (np.arange(self.steps) + 0.5) / self.steps_per_row
-        self.at_rows = self._times(at)
-        self.in_steps = self._times(middle)
-        self.inputs_at_rows = programme.inputs
-        self.inputs_in_steps = {name: np.interp(middle, at, values) for name, values in programme.inputs.items()}
-        self.random_heat = {name: np.interp(middle, at, values) for name, values in programme.random_heat.items()}
-
-    def _times(self, row: Array) -> tuple[Array, Array]:
-        since = (row - self.programme.unrecorded) * self.plant.row_s / 3600.0
-        return np.maximum(self.programme.begins_h + since, 0.0), np.maximum(since, 0.0)
-
-
-def integrate(
-    plant: ZooPlant, programme: Programme, variants: Sequence[Variant]
-) -> tuple[Run, Clock, Laws, list[Change]]:
-    """Integrate a batch: the run, its clock, its laws, the different changes."""
+def integrate(plant: ZooPlant, programme: Programme, variants: Sequence[Variant]) -> Run:
+    """Integrate a batch."""
     clock, B = Clock(plant, programme), len(variants)
-    unique = list({id(change): change for variant in variants for change in variant.changes}.values())
-    laws = Laws(plant, [change for change in unique if change.kind == "bridge"])
+    changes = list({id(change): change for variant in variants for change in variant.changes}.values())
+    laws = Laws(plant, [change for change in changes if change.kind == "bridge"])
     acting: Acting = [
         (change, np.array([b for b, variant in enumerate(variants) if any(c is change for c in variant.changes)]))
-        for change in unique
+        for change in changes
     ]
     p = {
         name: np.array([variant.parameters.get(name, value) for variant in variants])
@@ -100,15 +106,15 @@ def integrate(
     n = len(laws.bodies)
     T = np.repeat(np.array([[programme.start[name]] for name in laws.bodies]), B, axis=1)
     before = T
-    kept, made = np.empty((clock.steps + 1, n, B)), [np.zeros((clock.rows, B)) for _ in unique]
+    kept, made = np.empty((clock.steps + 1, n, B)), [np.zeros((clock.rows, B)) for _ in changes]
     stored, given, shed = np.zeros(B), np.zeros(B), np.zeros(B)
     steady = np.empty(0)
     fresh: list[int] = []
     for step in range(clock.steps):
         row, part = divmod(step, clock.steps_per_row)
         kept[step] = T
-        raw = moment_of_batch(clock, step, T + 0.5 * (T - before), laws.bodies, p)
-        moment = feel(raw, acting)
+        T_middle = dict(zip(laws.bodies, T + 0.5 * (T - before), strict=True))
+        moment = feel(_one_instant(clock.in_steps, step, T=T_middle, p=p), acting)
         if step == 0:
             laws.note_reads(moment)
             steady, fresh = laws.values(moment), laws.changing()
@@ -130,42 +136,14 @@ def integrate(
     kept[-1] = T
     for kept_heat in made:
         kept_heat[-1] = kept_heat[-2] if clock.rows > 1 else 0.0
-    run = Run(
-        T=kept[:: clock.steps_per_row],
-        T_steps=kept,
-        made=made,
-        balance=HeatBalance(stored=stored, given=given, shed=shed),
-    )
-    return run, clock, laws, unique
+    return Run(clock=clock, laws=laws, changes=changes, T_steps=kept, made=made, stored=stored, given=given, shed=shed)
 
 
-def moment_of_batch(clock: Clock, step: int, T: Array, bodies: Sequence[str], p: Mapping[str, Array]) -> Moment:
-    """Middle of a step of B runs."""
-    hours, since = clock.in_steps
-    ones = np.ones(T.shape[1])
-    return Moment(
-        hours=hours[step] * ones,
-        since_start=since[step] * ones,
-        inputs={name: values[step] * ones for name, values in clock.inputs_in_steps.items()},
-        T=dict(zip(bodies, T, strict=True)),
-        p=p,
-    )
-
-
-def rows_of_run(laws: Laws, clock: Clock, variant: Variant, T: Array) -> tuple[Moment, Array]:
-    """Moment of all rows of one run and the values of all laws, from temperatures of the shape (rows, bodies)."""
-    ones = np.ones(clock.rows)
-    hours, since = clock.at_rows
-    p = {name: variant.parameters.get(name, value) * ones for name, value in laws.plant.parameters.items()}
-    raw = Moment(
-        hours=hours,
-        since_start=since,
-        inputs=clock.inputs_at_rows,
-        T={name: T[:, k] for k, name in enumerate(laws.bodies)},
-        p=p,
-    )
-    moment = feel(raw, [(change, slice(None)) for change in variant.changes])
-    return moment, laws.values(moment)
+def _one_instant(m: Moment, k: int, *, T: Mapping[str, Array], p: Mapping[str, Array]) -> Moment:
+    """One instant of a moment for all runs of a batch, with their temperatures and parameters."""
+    ones = np.ones(len(next(iter(T.values()))))
+    inputs = {name: values[k] * ones for name, values in m.inputs.items()}
+    return Moment(hours=m.hours[k] * ones, since_start=m.since_start[k] * ones, inputs=inputs, T=T, p=p)
 
 
 def read_probes(plant: ZooPlant, T: Mapping[str, Array], first: int) -> dict[str, Array]:

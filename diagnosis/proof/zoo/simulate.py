@@ -11,7 +11,7 @@ import numpy as np
 from diagnosis.proof.plant.cycles import Programme
 from diagnosis.proof.plant.integrator import GAMMA
 from diagnosis.proof.zoo.laws import Balance, feel
-from diagnosis.proof.zoo.run import integrate, read_probes, rows_of_run
+from diagnosis.proof.zoo.run import integrate, read_probes
 from diagnosis.proof.zoo.structure import Change, Moment, Outcome, Variant, ZooPlant
 from models.base.types import Array
 
@@ -64,12 +64,13 @@ def simulate(plant: ZooPlant, programme: Programme, variants: Sequence[Variant])
         Of the recorded rows; inputs with what changes of kind ``input`` add. ``heat`` is the mean over the step after a
         row; of a change of a capacity it is the heat that the capacity gives, of an input zero.
     """
-    run, clock, laws, unique = integrate(plant, programme, variants)
+    run = integrate(plant, programme, variants)
+    laws = run.laws
     first = programme.unrecorded
-    place = {id(change): k for k, change in enumerate(unique)}
+    place = {id(change): k for k, change in enumerate(run.changes)}
     inputs, P_loss, boundary = [], [], []
     for b, variant in enumerate(variants):
-        moment, values = rows_of_run(laws, clock, variant, run.T[:, :, b])
+        moment, values = run.at_rows(b, variant)
         inputs.append(moment.inputs)
         acting = [(change, slice(None)) for change in variant.changes]
         P_loss.append(laws.balance(moment, values, acting).loss[first:])
@@ -116,24 +117,21 @@ class Linearised:
     """
 
     def __init__(self, plant: ZooPlant, programme: Programme) -> None:
-        run, clock, laws, _ = integrate(plant, programme, [Variant()])
-        self.laws, self.clock = laws, clock
+        run = integrate(plant, programme, [Variant()])
+        self.laws, self.clock = run.laws, run.clock
         start = run.T_steps[:-1, :, 0].T  # (bodies, steps)
         before = np.concatenate([start[:, :1], start[:, :-1]], axis=1)
-        self.raw = self._moment(clock.in_steps, clock.inputs_in_steps, start + 0.5 * (start - before))
-        self.raw_rows = self._moment(clock.at_rows, clock.inputs_at_rows, run.T[:, :, 0].T)
+        self.raw = self._moment(run.clock.in_steps, start + 0.5 * (start - before))
+        self.raw_rows = self._moment(run.clock.at_rows, run.T[:, :, 0].T)
         self.base, self.values = self._evaluate(self.raw)
         self.base_rows, self.values_rows = self._evaluate(self.raw_rows)
         self.whole = replace(self.raw, T=self.base.T)
         self.whole_rows = replace(self.raw_rows, T=self.base_rows.T)
         self._stages(start)
 
-    def _moment(self, times: tuple[Array, Array], inputs: Mapping[str, Array], T: Array) -> Moment:
-        count = len(times[0])
-        p = {k: np.full(count, v) for k, v in self.laws.plant.parameters.items()}
-        return Moment(
-            hours=times[0], since_start=times[1], inputs=inputs, T=dict(zip(self.laws.bodies, T, strict=True)), p=p
-        )
+    def _moment(self, m: Moment, T: Array) -> Moment:
+        p = {k: np.full(len(m.hours), v) for k, v in self.laws.plant.parameters.items()}
+        return replace(m, T=dict(zip(self.laws.bodies, T, strict=True)), p=p)
 
     def _evaluate(
         self, raw: Moment, held: Array | None = None, fresh: Sequence[int] | None = None

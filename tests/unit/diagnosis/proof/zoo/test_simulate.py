@@ -96,7 +96,7 @@ def test_heat_balance_closes(gearbox):
         Change(kind="capacity", target="oil.sump", law=lambda m: 0.3 * ones(m)),
         Change(kind="input", target="T_ambient", law=lambda m: 5.0 * m.hours),
     )
-    balance = integrate(plant, programme, [Variant(), Variant(changes=changes), Variant(quiet=True)])[0].balance
+    balance = integrate(plant, programme, [Variant(), Variant(changes=changes), Variant(quiet=True)])
     assert np.abs(balance.stored - balance.given + balance.shed).max() < 1e-9 * balance.given.max()
 
 
