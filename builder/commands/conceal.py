@@ -32,11 +32,11 @@ def _list_effects(context: click.Context, _: click.Parameter, asked: bool) -> No
             )
             context.exit()
         from diagnosis.proof.cases.conceal import EFFECTS
-        from diagnosis.proof.injection.inject import DESCRIPTIONS
+        from diagnosis.proof.injection.kinds import KINDS
 
         rows = [[name, "yes" if effect.catalogue else "no", effect.law] for name, effect in sorted(EFFECTS.items())]
         console.table("Effects that can be concealed", ["name", "in the catalogue", "law"], rows, text_columns=3)
-        injected = [list(item) for item in DESCRIPTIONS.items()]
+        injected = [[name, kind.law] for name, kind in KINDS.items()]
         console.table("Effects that can be injected (--into)", ["name", "what it is"], injected, text_columns=2)
         context.exit()
 

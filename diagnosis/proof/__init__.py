@@ -11,7 +11,8 @@ Three ways to a case, each with an order to read it in:
   concealed), ``zoo.oracle`` (evidence that recordings hold), ``zoo.recorder``; ``zoo.draw`` draws a case with these,
   ``zoo.conceal_zoo`` a set.
 - A recording of a real machine (``injection``): ``injection.calibrated_model`` shows what a change would do,
-  ``machine_changes`` and ``instrument_faults`` are the changes, ``injection.inject`` draws and writes.
+  ``machine_changes`` and ``instrument_faults`` are the changes, ``injection.kinds`` their table, ``injection.inject``
+  draws them.
 
 All plants share programmes (``plant.cycles``), sizes (``plant.sizes``), the time step (``plant.integrator``), what
 instruments have in common, and the files and facts of a case (``cases.case_files``, ``cases.truth``).

@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from diagnosis.proof.cases.case_files import CaseFiles, case_names
-from diagnosis.proof.cases.time_course import FORMS, Form
 from diagnosis.proof.cases.truth import size_of, size_of_heat
 from diagnosis.proof.injection.calibrated_model import CalibratedModel, calibrate
-from diagnosis.proof.injection.instrument_faults import (
-    INPUT_FAULTS,
-    INSTRUMENT_FAULTS,
-    LONGEST_STUCK_S,
-    instrument_places,
-)
-from diagnosis.proof.injection.machine_changes import MACHINE_CHANGES, places
+from diagnosis.proof.injection.instrument_faults import LONGEST_STUCK_S
+from diagnosis.proof.injection.kinds import KINDS
 from diagnosis.proof.injection.real_recording import RealRecording, read_real_recording
 from diagnosis.proof.injection.trial import Trial, choose_size, draw_course
 from diagnosis.recordings.time_axis import moment_text
@@ -31,34 +25,7 @@ SCHEMA = 1
 # Largest change of a measured temperature, [K]: of fast recordings, and of those whose rows are means over minutes.
 BOUNDS_K, SLOW_BOUNDS_K, SLOW_S = (0.3, 6.0), (1.0, 15.0), 60.0
 TRIES = 6  # draws of kind, place and date, until one reaches the lower bound
-KINDS = (*MACHINE_CHANGES, *INSTRUMENT_FAULTS, *INPUT_FAULTS)
 SHARES = {"machine": 0.55, "instrument": 0.3, "input": 0.15}
-ONLY_FORMS: dict[str, tuple[Form, ...]] = {
-    "drift": ("ramp",), "bias": ("step", "from_to"), "stuck": ("from_to",), "lag": ("step", "from_to"),
-    "swapped": ("step", "from_to"), "clock": ("step",), "capacity": ("step",),
-}  # fmt: skip
-DESCRIPTIONS = {
-    "loss_factor": "a loss or heat source becomes larger or smaller, -60 % to +150 %",
-    "link_factor": "a heat path conducts more or less, -60 % to +150 %",
-    "new_link": "a further heat path between two nodes, or to the surroundings",
-    "thermostat": "a cooler with a thermostat valve",
-    "heat": "heat into a node or out of it, steady or with the speed",
-    "capacity": "a heat capacity changes, -50 % to +100 %",
-    "bias": "a sensor shows too much or too little",
-    "gain": "a sensor's scale is wrong",
-    "drift": "a sensor's bias grows",
-    "lag": "a sensor follows slowly",
-    "stuck": "a sensor hangs for hours",
-    "swapped": "two sensors are recorded in each other's columns",
-    "clock": "temperatures come late against the inputs",
-    "input_offset": "a recorded input is off by a constant",
-    "input_gain": "a recorded input is off by a factor",
-}
-
-NOUNS = {
-    "loss_factor": "loss or heat source", "link_factor": "link", "new_link": "pair of nodes without a link",
-    "thermostat": "pair of node and boundary", "heat": "node", "capacity": "node",
-}  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +35,7 @@ class Wish:
     Attributes
     ----------
     kind : str or None
-        One of :data:`KINDS`
+        One of :data:`~diagnosis.proof.injection.kinds.KINDS`
     date : str or None
         When it begins: a date, or seconds as in the name of a part
     control : bool
@@ -119,9 +86,7 @@ class Injector:
 
     def places(self, kind: str) -> list[str]:
         """Return where a kind of change can be."""
-        if kind in MACHINE_CHANGES:
-            return places(kind, self.gearbox.network())
-        return instrument_places(kind, self.real, self.gearbox)
+        return KINDS[kind].places(self.real, self.gearbox.network())
 
     def check(self, wish: Wish) -> None:
         """Refuse a wish that this machine and recording cannot fulfil.
@@ -142,9 +107,11 @@ class Injector:
         if not known:
             raise InputError(f"{self.real.path}: has no column that {wish.kind} could act on; choose another --effect")
         if wish.place is not None and wish.place not in known:
-            where = self.gearbox.file if wish.kind in MACHINE_CHANGES else str(self.real.path)
-            noun = NOUNS.get(wish.kind, "sensor" if wish.kind in INSTRUMENT_FAULTS else "input")
-            raise InputError(f"{where}: has no {noun} {wish.place!r} for {wish.kind}{did_you_mean(wish.place, known)}")
+            kind = KINDS[wish.kind]
+            where = self.gearbox.file if kind.group == "machine" else str(self.real.path)
+            raise InputError(
+                f"{where}: has no {kind.noun} {wish.place!r} for {wish.kind}{did_you_mean(wish.place, known)}"
+            )
 
     def draw(self, wish: Wish, rng: np.random.Generator) -> tuple[Trial, int]:
         """Draw an injection, and which of its sizes; again while the largest possible one is below the bound.
@@ -167,24 +134,23 @@ class Injector:
         return best[1], best[2]
 
     def _trial(self, wish: Wish, rng: np.random.Generator) -> Trial:
-        kind = wish.kind or self._kind(rng)
-        known = self.places(kind)
+        name = wish.kind or self._kind(rng)
+        kind, known = KINDS[name], self.places(name)
         place = wish.place or known[int(rng.integers(len(known)))]
         course = draw_course(
-            float(self.real.time[-1]), rng, forms=ONLY_FORMS.get(kind, FORMS),
+            float(self.real.time[-1]), rng, forms=kind.forms,
             date_s=None if wish.date is None else self.real.moment(wish.date),
-            longest_s=LONGEST_STUCK_S if kind == "stuck" else np.inf,
+            longest_s=LONGEST_STUCK_S if name == "stuck" else np.inf,
         )  # fmt: skip
-        if kind in MACHINE_CHANGES:
-            return MACHINE_CHANGES[kind](self.model, place, course, rng)
-        if kind in INSTRUMENT_FAULTS:
-            return INSTRUMENT_FAULTS[kind](self.real, place, course, rng)
-        return INPUT_FAULTS[kind](self.model, place, course, rng)
+        made = kind.make(self.real if kind.group == "instrument" else self.model, place, course, rng)
+        return replace(made, kind=name)
 
     def _kind(self, rng: np.random.Generator) -> str:
         """Draw a kind that this machine and recording can have."""
-        groups = {"machine": MACHINE_CHANGES, "instrument": INSTRUMENT_FAULTS, "input": INPUT_FAULTS}
-        possible = {name: [kind for kind in kinds if self.places(kind)] for name, kinds in groups.items()}
+        possible: dict[str, list[str]] = {group: [] for group in SHARES}
+        for name, kind in KINDS.items():
+            if self.places(name):
+                possible[kind.group].append(name)
         weights = np.array([SHARES[name] if kinds else 0.0 for name, kinds in possible.items()])
         group = list(possible)[int(rng.choice(len(weights), p=weights / weights.sum()))]
         return possible[group][int(rng.integers(len(possible[group])))]
@@ -271,7 +237,7 @@ def _effect(injector: Injector, trial: Trial, chosen: int) -> dict[str, Any]:
     units = {quantity: float(np.nanmax(np.abs(values[chosen]))) for quantity, values in trial.columns.items()}
     return {
         "name": trial.kind,
-        "law": DESCRIPTIONS[trial.kind],
+        "law": KINDS[trial.kind].law,
         "of": trial.of,
         "nodes": list(trial.nodes),
         "size": float(f"{trial.sizes[chosen]:.6g}"),

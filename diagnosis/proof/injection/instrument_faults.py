@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +15,6 @@ from diagnosis.proof.injection.calibrated_model import CalibratedModel
 from diagnosis.proof.injection.machine_changes import input_shift
 from diagnosis.proof.injection.real_recording import RealRecording
 from diagnosis.proof.injection.trial import SIZES, SMALLEST, Trial, ladder
-from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError
 from models.base.types import Array
 from models.network.laws import symbol
@@ -29,27 +28,18 @@ INPUT_OFFSET_K, INPUT_OFFSET, INPUT_GAIN = 6.0, 0.1, 0.2  # the second of the in
 USUAL_PERCENTILE = 95.0
 SMOOTH = 7  # rows of a running median
 
-Maker = Callable[[RealRecording, str, Course, np.random.Generator], Trial]
-
 
 def bias(real: RealRecording, channel: str, course: Course, rng: np.random.Generator) -> Trial:
     """Reading plus `size` [K]."""
     sizes = ladder(-BIAS_K, BIAS_K, rng)
     shift = sizes[:, None] * np.where(np.isnan(real.channels[channel]), np.nan, course.share(real.time))
-    return _sensor(real, "bias", channel, course, sizes, "K", shift)
-
-
-def drift(real: RealRecording, channel: str, course: Course, rng: np.random.Generator) -> Trial:
-    """Reading plus a bias that grows to `size` [K]: a bias with a ramp as its course."""
-    return replace(bias(real, channel, course, rng), kind="drift")
+    return _sensor(real, channel, course, sizes, "K", shift)
 
 
 def gain(real: RealRecording, channel: str, course: Course, rng: np.random.Generator) -> Trial:
     """Reading in degC times ``1 + size``."""
     sizes = ladder(-GAIN, GAIN, rng)
-    return _sensor(
-        real, "gain", channel, course, sizes, "1", sizes[:, None] * real.channels[channel] * course.share(real.time)
-    )
+    return _sensor(real, channel, course, sizes, "1", sizes[:, None] * real.channels[channel] * course.share(real.time))
 
 
 def lag(real: RealRecording, channel: str, course: Course, _: np.random.Generator) -> Trial:
@@ -62,7 +52,7 @@ def lag(real: RealRecording, channel: str, course: Course, _: np.random.Generato
     slow = np.stack([lagged(whole[first:], np.diff(real.time[first:]), float(size)) for size in sizes])
     shift = np.zeros((len(sizes), len(values)))
     shift[:, first:] = (slow - whole[first:]) * acts[first:]
-    return _sensor(real, "lag", channel, course, sizes, "s", np.where(np.isfinite(values), shift, np.nan))
+    return _sensor(real, channel, course, sizes, "s", np.where(np.isfinite(values), shift, np.nan))
 
 
 def stuck(real: RealRecording, channel: str, course: Course, _: np.random.Generator) -> Trial:
@@ -72,7 +62,7 @@ def stuck(real: RealRecording, channel: str, course: Course, _: np.random.Genera
     if not len(before):
         raise InputError(f"{channel} has no reading before {course.begins:.0f} s that it could be stuck at")
     held = float(values[before[-1]])
-    return _sensor(real, "stuck", channel, course, np.ones(1), "1", ((held - values) * acts)[None])
+    return _sensor(real, channel, course, np.ones(1), "1", ((held - values) * acts)[None])
 
 
 def swapped(real: RealRecording, channel: str, course: Course, rng: np.random.Generator) -> Trial:
@@ -82,7 +72,7 @@ def swapped(real: RealRecording, channel: str, course: Course, rng: np.random.Ge
     acts = course.share(real.time)
     # Nothing changes outside its dates, also where one of the two is missing.
     difference = np.where(acts > 0.0, (real.channels[other] - real.channels[channel]) * acts, 0.0)
-    trial = _sensor(real, "swapped", channel, course, np.ones(1), "1", difference[None])
+    trial = _sensor(real, channel, course, np.ones(1), "1", difference[None])
     shifts = {channel: difference[None], other: -difference[None]}
     return replace(
         trial, of=f"{channel},{other}", nodes=(*trial.nodes, node_of_channel(other, real.nodes)), K=shifts,
@@ -110,15 +100,10 @@ def clock(real: RealRecording, _: str, course: Course, __: np.random.Generator) 
             moved[k, before] = smooth[at][before] - smooth[before]
         columns[f"T_{name}"], K[name] = shifts, moved
     return Trial(
-        kind="clock", what="clock", of="temperatures", nodes=(), course=course, sizes=rows * step, unit="s",
+        what="clock", of="temperatures", nodes=(), course=course, sizes=rows * step, unit="s",
         columns=columns, K=K,
         size_K=np.median([np.sqrt(np.mean(moved[:, acts] ** 2, axis=1)) for moved in K.values()], axis=0),
     )  # fmt: skip
-
-
-INSTRUMENT_FAULTS: Mapping[str, Maker] = {
-    "bias": bias, "gain": gain, "drift": drift, "lag": lag, "stuck": stuck, "swapped": swapped, "clock": clock
-}  # fmt: skip
 
 
 def input_offset(model: CalibratedModel, name: str, course: Course, rng: np.random.Generator) -> Trial:
@@ -128,53 +113,35 @@ def input_offset(model: CalibratedModel, name: str, course: Course, rng: np.rand
     cap = INPUT_OFFSET_K if is_temperature else INPUT_OFFSET * _usual(real.inputs[name])
     sizes = ladder(-cap, cap, rng)
     shift = sizes[:, None] * np.where(np.isnan(real.inputs[name]), np.nan, course.share(real.time))
-    return _input(model, "input_offset", name, sp.Integer(1), course, sizes, shift)
+    unit = network.inputs[name].quantity.unit if name in network.inputs else "1"
+    return _input(model, name, sp.Integer(1), course, sizes, unit, shift)
 
 
 def input_gain(model: CalibratedModel, name: str, course: Course, rng: np.random.Generator) -> Trial:
     """Recorded input times ``1 + size``."""
     sizes = ladder(-INPUT_GAIN, INPUT_GAIN, rng)
     shift = sizes[:, None] * model.real.inputs[name] * course.share(model.real.time)
-    return _input(model, "input_gain", name, symbol(name), course, sizes, shift)
-
-
-INPUT_FAULTS: Mapping[str, Callable[[CalibratedModel, str, Course, np.random.Generator], Trial]] = {
-    "input_offset": input_offset, "input_gain": input_gain
-}  # fmt: skip
-
-
-def instrument_places(kind: str, real: RealRecording, gearbox: Gearbox) -> list[str]:
-    """Return the channels or inputs that can have a fault."""
-    moving = [name for name, values in real.channels.items() if np.nanmax(values) > np.nanmin(values)]
-    if kind == "clock":
-        return ["temperatures"] if moving else []
-    if kind == "swapped":
-        return moving if len(moving) > 1 else []
-    if kind in INSTRUMENT_FAULTS:
-        return moving
-    known = gearbox.network().inputs
-    return [name for name in real.inputs if kind == "input_offset" or not known[name].quantity.is_temperature]
+    return _input(model, name, symbol(name), course, sizes, "1", shift)
 
 
 def _sensor(
-    real: RealRecording, kind: str, channel: str, course: Course, sizes: Array, unit: str, shift: Array
+    real: RealRecording, channel: str, course: Course, sizes: Array, unit: str, shift: Array
 ) -> Trial:  # fmt: skip
     node = node_of_channel(channel, real.nodes)
     return Trial(
-        kind=kind, what="sensor", of=channel, nodes=(node,), course=course, sizes=sizes, unit=unit,
+        what="sensor", of=channel, nodes=(node,), course=course, sizes=sizes, unit=unit,
         columns={f"T_{channel}": shift}, K={channel: shift},
     )  # fmt: skip
 
 
 def _input(
-    model: CalibratedModel, kind: str, name: str, law: sp.Expr, course: Course, sizes: Array, shift: Array
+    model: CalibratedModel, name: str, law: sp.Expr, course: Course, sizes: Array, unit: str, shift: Array
 ) -> Trial:  # fmt: skip
-    inside = model.network.inputs.get(name)
-    nothing: Mapping[str, Array] = {channel: np.zeros(shift.shape) for channel in model.real.channels}
-    K = nothing if inside is None else input_shift(model, name, law, sizes, course)
-    unit = "1" if kind == "input_gain" or inside is None else inside.quantity.unit
+    K: Mapping[str, Array] = {channel: np.zeros(shift.shape) for channel in model.real.channels}
+    if name in model.network.inputs:
+        K = input_shift(model, name, law, sizes, course)
     return Trial(
-        kind=kind, what="input", of=name, nodes=(), course=course, sizes=sizes, unit=unit, columns={name: shift}, K=K
+        what="input", of=name, nodes=(), course=course, sizes=sizes, unit=unit, columns={name: shift}, K=K
     )  # fmt: skip
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +14,6 @@ from diagnosis.proof.injection.trial import Trial, ladder
 from models.base.types import Array
 from models.formulas.extremes import Max, Min
 from models.network.laws import symbol
-from models.simulation.thermal_network import ThermalNetwork
 
 FACTOR = (-0.6, 1.5)  # relative change of a loss, a heat source or a conductance
 CAPACITY = (-0.5, 1.0)
@@ -36,8 +35,6 @@ CONTROLLED = (
 )
 BY_VALVE = "; the injected valve follows the reading plus the change"
 
-Maker = Callable[[CalibratedModel, str, Course, np.random.Generator], Trial]
-
 
 def loss_factor(model: CalibratedModel, name: str, course: Course, rng: np.random.Generator) -> Trial:
     """Loss or heat source times ``1 + size``."""
@@ -47,7 +44,7 @@ def loss_factor(model: CalibratedModel, name: str, course: Course, rng: np.rando
     made = d.result.losses[name] if name in d.result.losses else d.result.extra_heat[name]
     heat = made[1:] * _share(model, d, course)
     return _trial(
-        model, d, course, kind="loss_factor", what="loss" if source.is_loss else "heat", of=name,
+        model, d, course, what="loss" if source.is_loss else "heat", of=name,
         nodes=(source.node,), unit="1", heat={source.node: heat},
     )  # fmt: skip
 
@@ -58,7 +55,7 @@ def link_factor(model: CalibratedModel, name: str, course: Course, rng: np.rando
     changed = model.prepared().with_link_factor(name, SIZE_AND_COURSE)
     d = model.differences(changed, ladder(*FACTOR, rng), course)
     return _trial(
-        model, d, course, kind="link_factor", what="link", of=name, nodes=link.nodes, unit="1",
+        model, d, course, what="link", of=name, nodes=link.nodes, unit="1",
         heat=_flow(model, d, name, _share(model, d, course)),
     )  # fmt: skip
 
@@ -71,7 +68,7 @@ def new_link(model: CalibratedModel, name: str, course: Course, rng: np.random.G
     cap = PATH_SHARE * model.heat_W / max(abs(float(difference)), LEAST_DIFFERENCE_K)
     d = model.differences(changed, ladder(0.0, cap, rng), course)
     return _trial(
-        model, d, course, kind="new_link", what="link", of=name, nodes=(a, b), unit="W/K",
+        model, d, course, what="link", of=name, nodes=(a, b), unit="W/K",
         heat=_flow(model, d, "injected", 1.0),
     )  # fmt: skip
 
@@ -91,7 +88,7 @@ def thermostat(model: CalibratedModel, name: str, course: Course, rng: np.random
     cap = 2.0 * PATH_SHARE * model.heat_W / max(difference, LEAST_DIFFERENCE_K)
     d = model.differences(changed, ladder(0.0, cap, rng), course, {SEEN: seen})
     return _trial(
-        model, d, course, kind="thermostat", what="link", of=name, nodes=(node, boundary), unit="W/K",
+        model, d, course, what="link", of=name, nodes=(node, boundary), unit="W/K",
         heat=_flow(model, d, "injected", 1.0), further_reason=BY_VALVE,
         facts={"opens_degC": round(opens, 2), "open_degC": round(opens + VALVE_OPENS_K, 2)},
     )  # fmt: skip
@@ -107,7 +104,7 @@ def heat(model: CalibratedModel, name: str, course: Course, rng: np.random.Gener
     sizes = ladder(HEAT_SHARE[0] * model.heat_W, HEAT_SHARE[1] * model.heat_W, rng)
     d = model.differences(changed, sizes, course)
     return _trial(
-        model, d, course, kind="heat", what="heat", of=name, nodes=(name,), unit="W",
+        model, d, course, what="heat", of=name, nodes=(name,), unit="W",
         heat={name: d.result.extra_heat["injected"][1:]},
         facts={"law": f"size * |speed| / {full:.5g}" if with_speed else "size"},
     )  # fmt: skip
@@ -122,7 +119,7 @@ def capacity(model: CalibratedModel, name: str, course: Course, rng: np.random.G
         for n in network.nodes
     )
     d = model.differences(replace(network, nodes=nodes), ladder(*CAPACITY, rng), course)
-    return _trial(model, d, course, kind="capacity", what="capacity", of=name, nodes=(name,), unit="1", heat={})
+    return _trial(model, d, course, what="capacity", of=name, nodes=(name,), unit="1", heat={})
 
 
 def input_shift(
@@ -133,29 +130,6 @@ def input_shift(
     return _temperatures(model.differences(changed, sizes, course))
 
 
-MACHINE_CHANGES: Mapping[str, Maker] = {
-    "loss_factor": loss_factor, "link_factor": link_factor, "new_link": new_link, "thermostat": thermostat,
-    "heat": heat, "capacity": capacity,
-}  # fmt: skip
-
-
-def places(kind: str, network: ThermalNetwork) -> list[str]:
-    """Return where a change of the machine can be, by names of the nominal network."""
-    parts = [part.name for part in network.parts]
-    if kind == "loss_factor":
-        return [source.name for source in network.sources]
-    if kind == "link_factor":
-        return [link.name for link in network.links]
-    if kind in ("new_link", "thermostat"):
-        known = {frozenset(link.nodes) for link in network.links}
-        pairs = [(a, b) for a in parts for b in network.boundaries]
-        if kind == "new_link":
-            pairs += [(a, b) for i, a in enumerate(parts) for b in parts[i + 1 :]]
-            pairs = [pair for pair in pairs if frozenset(pair) not in known]
-        return [f"{a}-{b}" for a, b in pairs]
-    return parts
-
-
 # ---------------------------------------------------------------------- runs
 
 
@@ -164,7 +138,7 @@ def _temperatures(d: Differences) -> dict[str, Array]:
 
 
 def _trial(
-    model: CalibratedModel, d: Differences, course: Course, *, kind: str, what: str, of: str, nodes: tuple[str, ...],
+    model: CalibratedModel, d: Differences, course: Course, *, what: str, of: str, nodes: tuple[str, ...],
     unit: str, heat: Mapping[str, Array], facts: Mapping[str, object] | None = None, further_reason: str = "",
 ) -> Trial:  # fmt: skip
     known: dict[str, object] = {
@@ -185,7 +159,7 @@ def _trial(
             "active_share": round(float(control.active.mean()), 3),
         }
     return Trial(
-        kind=kind, what=what, of=of, nodes=nodes, course=course, sizes=d.sizes[1:], unit=unit, columns=d.readings,
+        what=what, of=of, nodes=nodes, course=course, sizes=d.sizes[1:], unit=unit, columns=d.readings,
         K=_temperatures(d), heat=heat, approximate=reason + further_reason, facts={**known, **(facts or {})},
     )  # fmt: skip
 

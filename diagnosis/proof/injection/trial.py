@@ -65,9 +65,10 @@ class Trial:
         Further facts for the truth
     size_K : Array, shape (B,), or None
         By which the size is chosen, if that is not the largest of `K`, [K]
+    kind : str
+        Its name in the table of kinds
     """
 
-    kind: str
     what: str
     of: str
     nodes: tuple[str, ...]
@@ -80,6 +81,7 @@ class Trial:
     approximate: str = ""
     facts: Mapping[str, Any] = field(default_factory=dict)
     size_K: Array | None = None
+    kind: str = ""
 
     @property
     def largest_K(self) -> Array:

@@ -16,9 +16,10 @@ from builder.commands.conceal import conceal
 from diagnosis.proof.cases.case_files import write_cases
 from diagnosis.proof.cases.time_course import Course
 from diagnosis.proof.injection.control import Control, find_control
-from diagnosis.proof.injection.inject import KINDS, Injector, Wish, inject_set
+from diagnosis.proof.injection.inject import Injector, Wish, inject_set
 from diagnosis.proof.injection.instrument_faults import stuck, swapped
-from diagnosis.proof.injection.machine_changes import MACHINE_CHANGES, heat
+from diagnosis.proof.injection.kinds import KINDS
+from diagnosis.proof.injection.machine_changes import heat
 from diagnosis.proof.injection.real_recording import read_real_recording
 from diagnosis.proof.injection.trial import choose_size
 from diagnosis.recordings.read import read_recording
@@ -139,7 +140,7 @@ def test_every_kind_states_what_it_changed(rod: Injector, tmp_path: Path, kind: 
     for name, shift in differences.items():
         assert np.abs(shift).max() == pytest.approx(effect["column_shift"][name], abs=0.006)
         assert not shift[rod.real.time < changed["from_s"] - 30.0].any()
-    assert truth["approximate"] == (kind in MACHINE_CHANGES)
+    assert truth["approximate"] == (KINDS[kind].group == "machine")
     largest = max(K["max"] for K in (effect["K_of_model"] or effect["K"]).values())
     assert effect["below_bounds"] == (largest < rod.bounds_K[0])
 
