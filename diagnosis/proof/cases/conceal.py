@@ -20,7 +20,7 @@ from diagnosis.proof.plant.effect import Concealed, Effect
 from diagnosis.proof.plant.effects_heat import HEAT_EFFECTS
 from diagnosis.proof.plant.effects_losses import LOSS_EFFECTS
 from diagnosis.proof.plant.effects_outside import OUTSIDE_EFFECTS
-from diagnosis.proof.plant.instruments import SENSOR_EFFECTS, OwnInstruments, default_channels, record
+from diagnosis.proof.plant.instruments import SENSOR_EFFECTS, Instruments, default_channels, record
 from diagnosis.proof.plant.plant import READINGS, Plant
 from diagnosis.proof.plant.plant_run import EXPONENTS, ORDINARY_SPREAD, Individual, Run, factor_sd, run_plant
 from models.assembly.gearbox import Gearbox, load_gearbox
@@ -289,18 +289,18 @@ def _run(plant: Plant, individual: Individual, programme: Programme, rng: np.ran
     return Run(individual=individual, programme=driven)
 
 
-def _instruments(plant: Plant, plan: Plan, rng: np.random.Generator) -> OwnInstruments:
+def _instruments(plant: Plant, plan: Plan, rng: np.random.Generator) -> Instruments:
     channels = default_channels(plant)
     lag = SLOW_LAG_S if plan.kind == "lag_wrong" else (10.0, 20.0)
     noisy = plan.kind == "noise_misstated"
     # Half of all cases come with a data sheet, so that its presence reveals nothing.
     stated = plan.kind in ("noise_misstated", "lag_wrong") or rng.random() < 0.5
-    return OwnInstruments(
+    return Instruments(
         channels=channels,
         lag_s={place: float(rng.uniform(*lag)) for place in channels},
         noise_K=float(rng.uniform(*NOISY_K)) if noisy else 0.2,
-        ambient_offset_K=float(rng.normal(0.0, 0.2)),
-        torque_gain=float(rng.normal(0.0, 0.008)),
+        input_offset={"T_ambient": float(rng.normal(0.0, 0.2))},
+        input_gain={"torque": float(rng.normal(0.0, 0.008))},
         loss_gain=float(rng.normal(0.0, 0.015)),
         loss_offset_W=float(rng.normal(0.0, 1.5)),
         stated=DATA_SHEET if stated else None,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from diagnosis.proof.plant.effect import Concealed
-from diagnosis.proof.plant.instruments import SENSOR_EFFECTS, OwnInstruments
+from diagnosis.proof.plant.instruments import SENSOR_EFFECTS, Instruments
 from diagnosis.proof.plant.plant_run import Individual, Run
 
 FAULTS = tuple(e.name for e in SENSOR_EFFECTS)
@@ -43,7 +43,7 @@ class ConcealedCase:
     seed: tuple[int, ...]
     individual: Individual
     effects: tuple[Concealed, ...]
-    instruments: OwnInstruments
+    instruments: Instruments
     runs: tuple[Run, ...]
 
     @property

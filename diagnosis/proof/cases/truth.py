@@ -65,8 +65,8 @@ def truth_of(plant: Plant, case: ConcealedCase, by_twin: Sequence[Sequence[Outco
         "friction_reading": case.individual.reading,
         "noise": {
             **facts_of_noise(instruments, instruments.lag_s, [run.programme for run in case.runs]),
-            "ambient_offset_K": round(instruments.ambient_offset_K, 3),
-            "torque_gain": round(instruments.torque_gain, 5),
+            "ambient_offset_K": round(instruments.input_offset["T_ambient"], 3),
+            "torque_gain": round(instruments.input_gain["torque"], 5),
         },
     }
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.signal import lfilter, lfiltic
@@ -12,8 +12,9 @@ from diagnosis.proof.plant.cycles import ROW_S, reference_torque
 from diagnosis.proof.plant.draws import at, either, one_of, relative
 from diagnosis.proof.plant.effect import MEASUREMENT, Concealed, Draw, Effect, Kind, Places
 from diagnosis.proof.plant.plant import Plant
-from diagnosis.proof.plant.plant_run import Outcome, Run
+from diagnosis.proof.plant.plant_run import INPUTS, Outcome, Run
 from models.base.types import Array
+from models.quantities.quantities import column_of_input
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,6 +37,12 @@ class Instruments:
         Bursts of missing readings per recording
     stated : mapping of str to float, or None
         Data sheet of the temperature sensors, by the keys of a mapping file; it may be wrong
+    lag_s : mapping of channel to float
+        Time constants of the sensors, where the plant itself does not have them
+    input_gain, input_offset : mapping of str to float
+        Errors of the recorded inputs: relative [-], and in the unit of the input
+    clock_s : float
+        Temperatures are stamped late by so much, [s]
     """
 
     channels: tuple[str, ...]
@@ -46,6 +53,17 @@ class Instruments:
     loss_offset_W: float = 0.0
     dropouts: int = 0
     stated: Mapping[str, float] | None = None
+    lag_s: Mapping[str, float] = field(default_factory=dict)
+    input_gain: Mapping[str, float] = field(default_factory=dict)
+    input_offset: Mapping[str, float] = field(default_factory=dict)
+    clock_s: float = 0.0
+
+    def inputs(self, true: Mapping[str, Array]) -> dict[str, Array]:
+        """Recorded inputs without noise."""
+        return {
+            name: values * (1.0 + self.input_gain.get(name, 0.0)) + self.input_offset.get(name, 0.0)
+            for name, values in true.items()
+        }
 
     def loss(self, true: Array) -> Array:
         """Measured loss without noise, [W]."""
@@ -58,30 +76,11 @@ class Instruments:
         return np.asarray(np.hypot(relative * loss, absolute) * rng.standard_normal(len(loss)))
 
 
-@dataclass(frozen=True, kw_only=True)
-class OwnInstruments(Instruments):
-    """Instruments of a plant of the own kind.
-
-    Attributes
-    ----------
-    lag_s : mapping of place to float
-        Time constant of every temperature sensor
-    ambient_offset_K : float
-        Error of the ambient probe
-    torque_gain : float
-        Relative error of the recorded torque, [-]
-    """
-
-    lag_s: Mapping[str, float]
-    ambient_offset_K: float = 0.0
-    torque_gain: float = 0.0
-
-
 def record(
     plant: Plant,
     run: Run,
     outcome: Outcome,
-    instruments: OwnInstruments,
+    instruments: Instruments,
     faults: Sequence[Concealed],
     rng: np.random.Generator | None,
 ) -> dict[str, Array]:
@@ -102,13 +101,8 @@ def record(
     """
     first, rows = run.programme.unrecorded, len(outcome.T)
     time = np.asarray(np.arange(rows) * ROW_S, dtype=np.float64)
-    true = {name: values[first:] for name, values in run.programme.inputs.items()}
-    inputs: dict[str, Array] = {
-        "speed_rpm": true["speed"],
-        "torque_Nm": true["torque"] * (1.0 + instruments.torque_gain),
-        "T_ambient_degC": true["T_ambient"] + instruments.ambient_offset_K,
-        "air_speed_m_s": true["air_speed"],
-    }
+    true = {name: run.programme.inputs[name][first:] for name in INPUTS}
+    inputs = {column_of_input(name): values for name, values in instruments.inputs(true).items()}
     places = plant.anatomy.coarse
     readings = {p: lagged(outcome.T[:, places.index(p)], instruments.lag_s[p]) for p in instruments.channels}
     loss = instruments.loss(outcome.P_loss)

@@ -6,10 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from diagnosis.proof.plant.cycles import Programme
+from diagnosis.proof.plant.instruments import Instruments
 from diagnosis.proof.zoo.effects import ZooEffect
 from diagnosis.proof.zoo.faults import Fault, spoiled
 from diagnosis.proof.zoo.oracle import LOSS, OracleNats
-from diagnosis.proof.zoo.recorder import ZooInstruments, measure
+from diagnosis.proof.zoo.recorder import measure
 from diagnosis.proof.zoo.simulate import simulate
 from diagnosis.proof.zoo.structure import Change, Law, Outcome, Variant, ZooPlant
 from models.base.types import Array
@@ -106,7 +107,7 @@ class ZooCase:
     plant: ZooPlant
     programmes: tuple[Programme, ...]
     effects: tuple[ZooEffect, ...]
-    instruments: ZooInstruments
+    instruments: Instruments
     session_deviation: float = 0.0
     sessions: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     distance_K: float

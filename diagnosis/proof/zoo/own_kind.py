@@ -10,7 +10,7 @@ import numpy as np
 from diagnosis.proof.plant.anatomy import AIR, FRAME, OIL, SPLASH, SUMP
 from diagnosis.proof.plant.cycles import Programme
 from diagnosis.proof.plant.effect import Concealed
-from diagnosis.proof.plant.instruments import OwnInstruments, record
+from diagnosis.proof.plant.instruments import Instruments, record
 from diagnosis.proof.plant.laws import Laws
 from diagnosis.proof.plant.plant import Moment as OwnMoment
 from diagnosis.proof.plant.plant import Plant
@@ -25,9 +25,7 @@ from models.quantities.quantities import column_of_input
 MOMENTS_KEPT = 30
 
 
-def design_of_own_kind(
-    plant: Plant, individual: Individual, runs: Sequence[Run], instruments: OwnInstruments
-) -> Design:
+def design_of_own_kind(plant: Plant, individual: Individual, runs: Sequence[Run], instruments: Instruments) -> Design:
     """The oracle's design of a case of the own kind.
 
     Parameters
@@ -40,7 +38,7 @@ def design_of_own_kind(
 
 
 def effect_on_readings(
-    plant: Plant, runs: Sequence[Run], instruments: OwnInstruments, effects: Sequence[Concealed]
+    plant: Plant, runs: Sequence[Run], instruments: Instruments, effects: Sequence[Concealed]
 ) -> list[Mapping[str, Array]]:
     """Noise-free readings with effects minus those without any, of the training recordings.
 
@@ -70,7 +68,7 @@ def effect_on_readings(
 
 
 def _by_wrong_inputs(
-    plant: Plant, run: Run, instruments: OwnInstruments, wrong: Mapping[str, Array]
+    plant: Plant, run: Run, instruments: Instruments, wrong: Mapping[str, Array]
 ) -> Mapping[str, Array]:
     """Readings that true inputs cause, less those that recorded inputs would, by channel."""
     zoo, right = as_zoo(plant, run.individual, instruments), as_programme(plant, run)
@@ -95,7 +93,7 @@ def as_programme(plant: Plant, run: Run) -> Programme:
     )
 
 
-def as_zoo(plant: Plant, individual: Individual, instruments: OwnInstruments) -> ZooPlant:
+def as_zoo(plant: Plant, individual: Individual, instruments: Instruments) -> ZooPlant:
     """One gearbox of the own kind as a plant of the zoo, with the same laws.
 
     Returns

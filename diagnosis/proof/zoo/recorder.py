@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,24 +20,7 @@ STEP = {"speed": 0.1, "torque": 0.01}  # of recorded inputs; 0.1 of others
 INPUT_NOISE = {AMBIENT: 0.1}
 
 
-@dataclass(frozen=True, kw_only=True)
-class ZooInstruments(Instruments):
-    """Instruments of a plant of the zoo, whose sensors have their lags in its probes.
-
-    Attributes
-    ----------
-    input_gain, input_offset : mapping of str to float
-        Errors of the recorded inputs: relative [-], and in the unit of the input
-    clock_s : float
-        Temperatures are stamped late by so much, [s]
-    """
-
-    input_gain: Mapping[str, float]
-    input_offset: Mapping[str, float]
-    clock_s: float
-
-
-def draw_instruments(plant: ZooPlant, kind: str | None, *, has_loss: bool, rng: np.random.Generator) -> ZooInstruments:
+def draw_instruments(plant: ZooPlant, kind: str | None, *, has_loss: bool, rng: np.random.Generator) -> Instruments:
     """Draw the instruments of a case; `kind` is that of a control, see :data:`diagnosis.proof.zoo.case.CONTROLS`."""
     slow = plant.row_s > SLOW_ROW_S
     noise = SLOW_NOISE_K if slow else NOISE_K
@@ -45,7 +28,7 @@ def draw_instruments(plant: ZooPlant, kind: str | None, *, has_loss: bool, rng: 
     stated = kind in ("noise_misstated", "lag_wrong") or rng.random() < 0.5
     gains = {"torque": 0.008, "speed": 0.001, "heater_power": 0.01}
     temperatures = [name for name in plant.inputs if name.startswith("T_")]
-    return ZooInstruments(
+    return Instruments(
         channels=tuple(probe.channel for probe in plant.probes),
         noise_K=noise * float(rng.uniform(2.0, 3.5)) if kind == "noise_misstated" else noise,
         input_gain={name: float(rng.normal(0.0, sd)) for name, sd in gains.items() if name in plant.inputs},
@@ -81,7 +64,7 @@ def measure(plant: ZooPlant, programme: Programme, outcome: Outcome, run: int) -
 
 def record(
     measured: Measured,
-    instruments: ZooInstruments,
+    instruments: Instruments,
     faults: Sequence[Fault],
     columns: Mapping[str, str],
     rng: np.random.Generator,
@@ -126,12 +109,9 @@ def record(
     return made
 
 
-def _with_errors(measured: Measured, instruments: ZooInstruments) -> Measured:
+def _with_errors(measured: Measured, instruments: Instruments) -> Measured:
     """Recording by these instruments without noise and faults."""
-    inputs = {
-        name: values * (1.0 + instruments.input_gain.get(name, 0.0)) + instruments.input_offset.get(name, 0.0)
-        for name, values in measured.inputs.items()
-    }
     time = measured.hours * 3600.0
     readings = {n: np.interp(time - instruments.clock_s, time, values) for n, values in measured.readings.items()}
-    return replace(measured, inputs=inputs, readings=readings, P_loss=instruments.loss(measured.P_loss))
+    inputs, P_loss = instruments.inputs(measured.inputs), instruments.loss(measured.P_loss)
+    return replace(measured, inputs=inputs, readings=readings, P_loss=P_loss)

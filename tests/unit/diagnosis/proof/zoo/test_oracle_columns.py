@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from diagnosis.proof.plant.cycles import Programme
+from diagnosis.proof.plant.instruments import Instruments
 from diagnosis.proof.zoo.oracle import LOSS, Design
 from diagnosis.proof.zoo.oracle_columns import design_of
-from diagnosis.proof.zoo.recorder import ZooInstruments
 from diagnosis.proof.zoo.simulate import simulate
 from diagnosis.proof.zoo.structure import (
     Body,
@@ -80,8 +80,7 @@ def recording(name: str, seed: int, begins_h: float) -> Programme:
 
 
 PROGRAMMES = (recording("train_1", 1, 0.0), recording("train_2", 2, 3.0), recording("hold_1", 3, 6.0))
-MEASUREMENT = ZooInstruments(channels=("oil", "wall"), noise_K=0.02, quantum_K=0.01, loss_noise=(0.01, 1.0),
-                             input_gain={}, input_offset={}, clock_s=0.0)  # fmt: skip
+MEASUREMENT = Instruments(channels=("oil", "wall"), noise_K=0.02, quantum_K=0.01, loss_noise=(0.01, 1.0))
 
 
 @pytest.fixture(scope="module")
