@@ -79,8 +79,6 @@ class Outcome:
         Temperatures at the coarse places, [degC]
     P_loss : Array, shape (rows,)
         Mechanical power lost, [W]
-    air, torque : Array, shape (rows,)
-        As the gearbox felt them, effects on inputs included
     losses : mapping of place to Array, shape (rows,)
         What the components of the loss model lose there, [W]
     heat : tuple of mapping of place to Array, shape (rows,)
@@ -91,8 +89,6 @@ class Outcome:
 
     T: Array
     P_loss: Array
-    air: Array
-    torque: Array
     losses: Mapping[str, Array]
     heat: tuple[Mapping[str, Array], ...]
     stored: float
@@ -168,7 +164,7 @@ class _Batch:
         T = np.array([[run.programme.start[node] for node in anatomy.nodes] for run in self.runs])
         before = T
         kept = np.empty((rows, B, len(anatomy.coarse)))
-        felt = {name: np.empty((rows, B)) for name in ("air", "torque", "lost")}
+        lost = np.empty((rows, B))
         losses = {place: np.zeros((rows, B)) for place in map(self.plant.place_of, self.plant.components)}
         balance = np.zeros((3, B))
         for row in range(rows):
@@ -177,18 +173,15 @@ class _Batch:
             middle = {name: 0.5 * (values[row] + values[after]) for name, values in inputs.items()}
             hours = np.maximum(row + 0.5 - skipped, 0.0) * ROW_S / 3600.0
             moment = self._moment(row, hours, middle, T + 0.5 * (T - before))
-            for name, values in (("air", moment.air), ("torque", moment.torque), ("lost", moment.lost)):
-                felt[name][row] = values
+            lost[row] = moment.lost
             for k, component in enumerate(self.plant.components):
                 losses[self.plant.place_of(component)][row] += moment.loss[:, k]
             before, T = T, self._step(T, moment, balance)
             if progress is not None and row % 20 == 19:
                 progress(20 * B)
-        return [self._outcome(i, kept, felt, losses, balance[:, i]) for i in range(B)]
+        return [self._outcome(i, kept, lost, losses, balance[:, i]) for i in range(B)]
 
-    def _outcome(
-        self, i: int, kept: Array, felt: Mapping[str, Array], losses: Mapping[str, Array], balance: Array
-    ) -> Outcome:
+    def _outcome(self, i: int, kept: Array, lost: Array, losses: Mapping[str, Array], balance: Array) -> Outcome:
         first = self.runs[i].programme.unrecorded
         heat: list[Mapping[str, Array]] = [{} for _ in self.runs[i].effects]
         for _, grip in self.grips:
@@ -196,9 +189,7 @@ class _Batch:
                 heat[grip.positions[k]] = {place: values[first:, k] for place, values in grip.made.items()}
         return Outcome(
             T=kept[first:, i],
-            P_loss=felt["lost"][first:, i],
-            air=felt["air"][first:, i],
-            torque=felt["torque"][first:, i],
+            P_loss=lost[first:, i],
             losses={place: values[first:, i] for place, values in losses.items()},
             heat=tuple(heat),
             stored=float(balance[0]),

@@ -61,17 +61,16 @@ def simulate(plant: ZooPlant, programme: Programme, variants: Sequence[Variant])
     Returns
     -------
     Outcome
-        Of the recorded rows; inputs with what changes of kind ``input`` add. ``heat`` is the mean over the step after a
-        row; of a change of a capacity it is the heat that the capacity gives, of an input zero.
+        Of the recorded rows. ``heat`` is the mean over the step after a row; of a change of a capacity it is the heat
+        that the capacity gives, of an input zero.
     """
     run = integrate(plant, programme, variants)
     laws = run.laws
     first = programme.unrecorded
     place = {id(change): k for k, change in enumerate(run.changes)}
-    inputs, P_loss, boundary = [], [], []
+    P_loss, boundary = [], []
     for b, variant in enumerate(variants):
         moment, values = run.at_rows(b, variant)
-        inputs.append(moment.inputs)
         acting = [(change, slice(None)) for change in variant.changes]
         P_loss.append(laws.balance(moment, values, acting).loss[first:])
         boundary.append(values[: len(laws.boundaries)])
@@ -85,7 +84,6 @@ def simulate(plant: ZooPlant, programme: Programme, variants: Sequence[Variant])
         T={name: values[:, first:] for name, values in whole.items()},
         readings=read_probes(plant, whole, first),
         P_loss=np.stack(P_loss),
-        inputs={name: np.stack([own[name][first:] for own in inputs]) for name in inputs[0]},
         heat=heat,
     )
 

@@ -232,8 +232,6 @@ class Outcome:
         Of every probe, with its lag, without noise, [degC]
     P_loss : Array, shape (B, rows)
         Mechanical loss, [W]
-    inputs : mapping of str to Array, shape (B, rows)
-        True inputs
     heat : sequence of B mappings of int to Array, shape (rows,)
         Heat [W] that each change of a run, by its place in ``changes``, made: of a ``path`` or ``bridge`` the further
         heat that flows from the first end to the second
@@ -242,7 +240,6 @@ class Outcome:
     T: Mapping[str, Array]
     readings: Mapping[str, Array]
     P_loss: Array
-    inputs: Mapping[str, Array]
     heat: Sequence[Mapping[int, Array]]
 
 
