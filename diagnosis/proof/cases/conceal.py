@@ -84,11 +84,6 @@ def mixed_plans(seed: int, counts: Mapping[str, int]) -> list[Plan]:
     ----------
     counts : mapping of group to int
         How many of each group; singles take every mechanism of the catalogue in turn before one comes twice
-
-    Raises
-    ------
-    InputError
-        If a group is not known.
     """
     turns, pairs, mess, order = (np.random.default_rng([seed, 1, stream]) for stream in range(4))
     makers: Mapping[str, Callable[[int], Plan]] = {
@@ -99,9 +94,6 @@ def mixed_plans(seed: int, counts: Mapping[str, int]) -> list[Plan]:
         "double": lambda _: Plan(group="double", effects=tuple(map(str, pairs.choice(PHYSICS, 2, replace=False)))),
         "messy": lambda _: _messy(mess),
     }
-    unknown = [group for group in counts if group not in makers]
-    if unknown:
-        raise InputError(f"{unknown[0]!r} is not a group of cases{did_you_mean(unknown[0], makers)}")
     plans = [makers[group](i) for group, number in counts.items() for i in range(number)]
     return [plans[i] for i in order.permutation(len(plans))]
 
@@ -187,7 +179,8 @@ def conceal_set(
              for i, (plan, name) in enumerate(zip(plans, case_names(len(plans)), strict=True))]  # fmt: skip
     for first in range(0, len(cases), TOGETHER):
         batch = cases[first : first + TOGETHER]
-        runs = [replace(run, effects=kept) for case in batch for kept in twins(case) for run in case.runs]
+        runs = [replace(run, effects=tuple(case.physics[i] for i in kept))
+                for case in batch for kept in twins(case) for run in case.runs]  # fmt: skip
         total, done = sum(map(len, runs)), 0
 
         def report(rows: int, first: int = first, count: int = len(batch), total: int = total) -> None:
@@ -198,26 +191,23 @@ def conceal_set(
 
         outcomes = iter(run_plant(plant, runs, report))
         for case in batch:
-            by_twin = [[next(outcomes) for _ in case.runs] for _ in twins(case)]
+            by_twin = {kept: [next(outcomes) for _ in case.runs] for kept in twins(case)}
             columns = {
                 run.programme.name: record(
                     plant, run, outcome, case.instruments, case.faults, np.random.default_rng([*case.seed, 7, k])
                 )
-                for k, (run, outcome) in enumerate(zip(case.runs, by_twin[0], strict=True))
+                for k, (run, outcome) in enumerate(zip(case.runs, by_twin[twins(case)[0]], strict=True))
             }
             files = files_of_recordings(columns, case.instruments.stated)
             yield CaseFiles(name=case.name, files=files, truth=truth_of(plant, case, by_twin))
 
 
-def twins(case: ConcealedCase) -> list[tuple[Concealed, ...]]:
-    """Sets of effects to simulate: all, none and, with several, all but the first or the second."""
-    physics = case.physics
-    if not physics:
-        return [()]
-    if len(physics) == 1:
-        return [physics, ()]
-    without = [tuple(e for e in physics if e is not left_out) for left_out in physics[:2]]
-    return [physics, (), *(without if len(physics) == 2 else without[:1])]
+def twins(case: ConcealedCase) -> list[tuple[int, ...]]:
+    """Which effects of the plant to simulate: all, none, and all but one of one or two, or but the first of more."""
+    everything = tuple(range(len(case.physics)))
+    left_out = everything if len(everything) <= 2 else everything[:1]
+    without = [tuple(i for i in everything if i != k) for k in left_out]
+    return list(dict.fromkeys([everything, (), *without]))
 
 
 # ---------------------------------------------------------------------- drawing

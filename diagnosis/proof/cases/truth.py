@@ -21,13 +21,13 @@ SETS = ("train", "hold")
 FAR_CONTROL = "parameter_far"
 
 
-def truth_of(plant: Plant, case: ConcealedCase, by_twin: Sequence[Sequence[Outcome]]) -> dict[str, Any]:
+def truth_of(plant: Plant, case: ConcealedCase, by_twin: Mapping[tuple[int, ...], Sequence[Outcome]]) -> dict[str, Any]:
     """The truth of a case, ready for JSON.
 
     Parameters
     ----------
-    by_twin : sequence of sequences of Outcome
-        Per twin (see :func:`diagnosis.proof.cases.conceal.twins`) the outcome of every recording
+    by_twin : mapping of tuple of int to sequence of Outcome
+        Outcome of every recording by which effects act (see :func:`diagnosis.proof.cases.conceal.twins`)
 
     Returns
     -------
@@ -35,15 +35,15 @@ def truth_of(plant: Plant, case: ConcealedCase, by_twin: Sequence[Sequence[Outco
         ``K`` are differences of the true temperatures with and without (of the readings, for faults of measurement),
         ``heat_W`` the heat that an effect made in a place, for paths and factors the difference that it made to it
     """
-    everything, without_any = by_twin[0], by_twin[min(1, len(by_twin) - 1)]
-    physics = case.physics
+    physics, all_of_them = case.physics, tuple(range(len(case.physics)))
+    everything, without_any = by_twin[all_of_them], by_twin[()]
     names = [run.programme.name for run in case.runs]
     rows = {name: len(outcome.T) for name, outcome in zip(names, everything, strict=True)}
     facts = []
     for effect in case.effects:
         if effect in physics:
             k = physics.index(effect)
-            twin = without_any if len(physics) == 1 else by_twin[2 + k] if 2 + k < len(by_twin) else None
+            twin = by_twin.get(tuple(i for i in all_of_them if i != k))
             K = None if twin is None else _kelvin(plant, case, everything, twin)
             triples = zip(names, everything, twin or without_any, strict=True)
             heat = facts_of_heat({name: _heat_of(effect, k, a, b) for name, a, b in triples}, rows)
