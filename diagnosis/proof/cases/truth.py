@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from diagnosis.proof.cases.concealed_case import ConcealedCase
-from diagnosis.proof.plant.cycles import Programme
+from diagnosis.proof.plant.cycles import HOLD, TRAIN, Programme
 from diagnosis.proof.plant.effect import Concealed
 from diagnosis.proof.plant.instruments import Instruments, record
 from diagnosis.proof.plant.plant import Plant
@@ -17,7 +17,7 @@ from diagnosis.proof.plant.plant_run import Outcome, factor_sd
 from models.base.types import Array
 
 SCHEMA = 1
-SETS = ("train", "hold")
+SETS = (TRAIN, HOLD)
 FAR_CONTROL = "parameter_far"
 
 

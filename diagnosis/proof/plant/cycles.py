@@ -15,6 +15,7 @@ from scipy.signal import lfilter
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 
+TRAIN, HOLD, BASELINE = "train", "hold", "baseline"  # how the name of a recording begins
 ROW_S = 10.0
 TOP_SPEED, REFERENCE_TORQUE = 0.8021, 94.0 / 350.0  # of the upper ends of the training range
 # Stairs as fraction of the top speed, each with a torque that keeps the oil of a dip-lubricated box below 120 degC.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from diagnosis.proof.plant.cycles import Programme
+from diagnosis.proof.plant.cycles import BASELINE, TRAIN, Programme
 from diagnosis.proof.plant.instruments import Instruments
 from diagnosis.proof.zoo.effects import ZooEffect
 from diagnosis.proof.zoo.faults import Fault, spoiled
@@ -17,7 +17,6 @@ from models.base.types import Array
 
 GROUPS = ("control", "single", "date", "sensor", "pair", "outside", "messy")
 CONTROLS = ("clean", "clean", "parameters_off", "noise_misstated", "lag_wrong")
-TRAIN, HOLD, BASELINE = "train", "hold", "baseline"
 SEEN_NATS = 3.0
 
 NatsOf = Callable[[Sequence[Mapping[str, Array]]], OracleNats]

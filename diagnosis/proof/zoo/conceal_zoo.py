@@ -9,7 +9,8 @@ import numpy as np
 
 from diagnosis.proof.cases.case_files import DEFINITION, CaseFiles, case_names, files_of_recordings
 from diagnosis.proof.cases.conceal import drawn_counts
-from diagnosis.proof.zoo.case import BASELINE, CONTROLS, GROUPS, ZooCase, ZooPlan
+from diagnosis.proof.plant.cycles import BASELINE
+from diagnosis.proof.zoo.case import CONTROLS, GROUPS, ZooCase, ZooPlan
 from diagnosis.proof.zoo.draw import draw_case
 from diagnosis.proof.zoo.families import FAMILIES, find_family
 from diagnosis.proof.zoo.recorder import measure, record

@@ -19,7 +19,7 @@ from diagnosis.engine.unknown import NetworkParameter
 from diagnosis.forward.grid import pieces
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.trajectory import Trajectory
-from diagnosis.proof.plant.cycles import Programme
+from diagnosis.proof.plant.cycles import TRAIN, Programme
 from diagnosis.proof.zoo.families.family import Family
 from diagnosis.proof.zoo.programmes import MINUTES_S, programmes
 from diagnosis.proof.zoo.simulate import simulate
@@ -98,7 +98,7 @@ def distance_K(plant: ZooPlant, session: Sequence[Programme]) -> float:
     gearbox = load_gearbox(plant.gearbox)
     every = 1 if plant.row_s > MINUTES_S else THINNED
     plant = replace(plant, row_s=every * plant.row_s)
-    learnt = [_thinned(p, every) for p in session if p.name.startswith("train")]
+    learnt = [_thinned(p, every) for p in session if p.name.startswith(TRAIN)]
     outcomes = [simulate(plant, programme, [Variant(quiet=True)]) for programme in learnt]
     hottest = {name: max(float(o.readings[name].max()) for o in outcomes) for name in outcomes[0].readings}
     plausible = max(hottest.values()) <= HOTTEST_DEGC and OIL_DEGC[0] <= hottest.get("oil", OIL_DEGC[0]) <= OIL_DEGC[1]

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from diagnosis.proof.cases.time_course import ALWAYS, Course
-from diagnosis.proof.zoo.case import BASELINE, CONTROLS, HOLD, TRAIN, NatsOf, ZooCase, ZooPlan, nats_of_case, run_case
+from diagnosis.proof.plant.cycles import BASELINE, HOLD, TRAIN
+from diagnosis.proof.zoo.case import CONTROLS, NatsOf, ZooCase, ZooPlan, nats_of_case, run_case
 from diagnosis.proof.zoo.distance import Drawn, draw_plant
 from diagnosis.proof.zoo.effects import Maker, ZooEffect
 from diagnosis.proof.zoo.effects_dates import DATED_MAKERS, draw_course

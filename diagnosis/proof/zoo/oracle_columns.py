@@ -15,7 +15,7 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 
-from diagnosis.proof.plant.cycles import Programme
+from diagnosis.proof.plant.cycles import TRAIN, Programme
 from diagnosis.proof.plant.instruments import Instruments
 from diagnosis.proof.zoo.oracle import LOSS, MEAN_S, Design, RecordingColumns, averaged
 from diagnosis.proof.zoo.run import follow, read_probes
@@ -41,7 +41,7 @@ def design_of(plant: ZooPlant, programmes: Sequence[Programme], instruments: Ins
     plant : ZooPlant
         Healthy
     """
-    runs = [Linearised(plant, one) for one in programmes if one.name.startswith("train")]
+    runs = [Linearised(plant, one) for one in programmes if one.name.startswith(TRAIN)]
     parameters = [ParameterDirection(name=n, step=sd * plant.parameters[n]) for n, sd in plant.spread.items()]
     smooth = _Smooth(plant, runs)
     errors = [*_errors_of_laws(plant, smooth), *_errors_of_splits(plant), *_errors_of_inputs(plant)]

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from diagnosis.proof.plant.anatomy import AIR, FRAME, OIL, SPLASH, SUMP
-from diagnosis.proof.plant.cycles import Programme
+from diagnosis.proof.plant.cycles import TRAIN, Programme
 from diagnosis.proof.plant.effect import Concealed
 from diagnosis.proof.plant.instruments import Instruments, record
 from diagnosis.proof.plant.laws import Laws
@@ -48,7 +48,7 @@ def effect_on_readings(
     -------
     list of mappings of channel to Array, shape (rows,)
     """
-    train = [run for run in runs if run.programme.name.startswith("train")]
+    train = [run for run in runs if run.programme.name.startswith(TRAIN)]
     physics = tuple(effect for effect in effects if not effect.is_fault)
     faults = [effect for effect in effects if effect.is_fault]
     twins = [replace(run, effects=kept) for run in train for kept in (physics, ())]

@@ -13,12 +13,11 @@ from typing import Literal
 
 import numpy as np
 
-from diagnosis.proof.plant.cycles import Programme
+from diagnosis.proof.plant.cycles import TRAIN, Programme
 from diagnosis.proof.zoo.structure import Body, Boundary, Change, Law, Moment, Outcome, Path, ZooPlant, constant, times
 from models.base.types import Array
 
 What = Literal["loss", "link", "capacity", "heat", "sensor", "input", "clock"]
-TRAIN = "train"
 
 
 class UnfitError(Exception):
