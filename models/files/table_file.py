@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import islice, takewhile
+from itertools import chain, islice, takewhile
 from pathlib import Path
 from typing import IO, Any, cast
 
@@ -90,7 +90,7 @@ def column_names(path: Path, form: TextForm = PLAIN) -> tuple[str, ...]:
 
             return tuple(distinct(parquet.read_schema(path).names))
         with _open_text(path, form) as text:
-            _, header = next(iter(_Lines(path, text, form).ahead(1)))
+            header = next(filter(str.strip, _first_lines(_lines(path, text, form), 1).values()))
             return tuple(distinct(_fields(header, form.separator)))
     except (InputError, ImportError, StopIteration, csv.Error, *UNREADABLE):
         return ()
@@ -102,11 +102,10 @@ def column_units(path: Path, form: TextForm) -> dict[str, str]:
         return {}
     try:
         with _open_text(path, form) as text:
-            lines = _Lines(path, text, form)
-            names = _check_head(path, lines, form)[0]
+            head = _read_head(path, _lines(path, text, form), form)
     except (csv.Error, *UNREADABLE):  # reading reports why
         return {}
-    return {name: unit for name, unit in zip(names, lines.units, strict=False) if unit}
+    return {name: unit for name, unit in zip(head.names, head.units, strict=False) if unit}
 
 
 def read_table(path: Path) -> pd.DataFrame:
@@ -214,80 +213,60 @@ def _open_text(path: Path, form: TextForm) -> Iterator[io.TextIOWrapper]:
             yield text
 
 
-class _Lines:
-    """Lines of a text for pandas: what is no table is blank, and foreign bytes are refused with their line number.
+class _Text:
+    """Lines as the file that pandas asks for."""
 
-    Attributes
-    ----------
-    units : sequence of str
-        Cells of the row of units, which is no table; see :func:`_check_head`
-    """
-
-    def __init__(self, path: Path, text: io.TextIOWrapper, form: TextForm) -> None:
-        self.path, self.number, self.form = path, 0, form
-        self.units: Sequence[str] = ()
-        self._text = text
-        self._waiting: list[str] = []
-        self._ahead: dict[int, int] = {}  # places of lines in it
+    def __init__(self, lines: Iterator[str]) -> None:
+        self._lines = lines
 
     def __iter__(self) -> Iterator[str]:
-        return self
-
-    def __next__(self) -> str:
-        line = self._waiting.pop(0) if self._waiting else self._read_line()
-        if not line:
-            raise StopIteration
-        return line
-
-    def _read_line(self) -> str:
-        line = next(self._text, "")
-        self.number += 1
-        if "\0" in line:
-            raise InputError(f"{self.path}: a NUL byte in line {self.number}; {self._advice_on_nul(line)}")
-        if not line.isascii():
-            try:
-                line.encode()
-            except UnicodeEncodeError as error:
-                byte, encoding = ord(line[error.start]) - 0xDC00, self.form.encoding.removesuffix("-sig").upper()
-                raise InputError(
-                    f"{self.path}: byte 0x{byte:02x} in line {self.number} is not {encoding}; {self._advice('cp1252')}"
-                ) from error
-        is_stated = self.number == 1 and _EXCEL_SEPARATOR.fullmatch(line)
-        # A '#' within a row is a cell such as '#REF!', so that pandas' own option for remarks cannot be used.
-        return "\n" if is_stated or line.startswith("#") or self.number in self.form.skip_lines else line
-
-    def _advice(self, encoding: str) -> str:
-        plain = "save the file as UTF-8"
-        if not self.form.by_mapping:
-            return f"{plain}, {_STATED}"
-        return f'give csv = {{ encoding = "{encoding}" }} in a mapping file, or {plain}'
-
-    def _advice_on_nul(self, line: str) -> str:
-        if self.number == 1 and set(line[1:10:2]) == {"\0"}:
-            return f"it looks like UTF-16 without a mark: {self._advice('utf-16-le')}"
-        return "it is no text, or damaged"
-
-    def ahead(self, count: int) -> list[tuple[int, str]]:
-        """Return the next lines that are not blank with their numbers; pandas will read them again."""
-        found: list[tuple[int, str]] = []
-        while len(found) < count and (line := self._read_line()):
-            number = self.number
-            # Names of columns may have line breaks within quotes.
-            while line.count('"') % 2 and self.number - number < MOST_BREAKS and (more := self._read_line()):
-                line += more
-            self._ahead[number] = len(self._waiting)
-            self._waiting.append(line)
-            if line.strip():
-                found.append((number, line))
-        return found
-
-    def replace(self, number: int, line: str) -> None:
-        """Let pandas read another text for the line of a number that is ahead, before it has read any."""
-        self._waiting[self._ahead[number]] = line
+        return self._lines
 
     def read(self, _size: int = -1) -> str:
         """Return some lines, as pandas asks for text."""
-        return "".join(islice(self, CHUNK_LINES))
+        return "".join(islice(self._lines, CHUNK_LINES))
+
+
+def _lines(path: Path, text: Iterable[str], form: TextForm) -> Iterator[str]:
+    """Yield lines; those that are no table are blank, and one of foreign bytes is refused with its number."""
+    for number, line in enumerate(text, start=1):
+        if "\0" in line:
+            advice = "it is no text, or damaged"
+            if number == 1 and set(line[1:10:2]) == {"\0"}:
+                advice = f"it looks like UTF-16 without a mark: {_to_decode('utf-16-le', form)}"
+            raise InputError(f"{path}: a NUL byte in line {number}; {advice}")
+        try:
+            line.encode()
+        except UnicodeEncodeError as error:
+            byte, encoding = ord(line[error.start]) - 0xDC00, form.encoding.removesuffix("-sig").upper()
+            raise InputError(
+                f"{path}: byte 0x{byte:02x} in line {number} is not {encoding}; {_to_decode('cp1252', form)}"
+            ) from error
+        is_stated = number == 1 and _EXCEL_SEPARATOR.fullmatch(line)
+        # A '#' within a row is a cell such as '#REF!', so that pandas' own option for remarks cannot be used.
+        yield "\n" if is_stated or line.startswith("#") or number in form.skip_lines else line
+
+
+def _to_decode(encoding: str, form: TextForm) -> str:
+    """Return what to do with a text of another encoding."""
+    plain = "save the file as UTF-8"
+    if not form.by_mapping:
+        return f"{plain}, {_STATED}"
+    return f'give csv = {{ encoding = "{encoding}" }} in a mapping file, or {plain}'
+
+
+def _first_lines(lines: Iterator[str], count: int) -> dict[int, str]:
+    """Take the first lines by number, up to `count` that are not blank; names may have line breaks within quotes."""
+    head: dict[int, str] = {}
+    numbered = enumerate(lines, start=1)
+    while count > 0 and (first := next(numbered, None)):
+        number, line = first
+        for _ in range(MOST_BREAKS):
+            if line.count('"') % 2:
+                line += next(numbered, (0, ""))[1]
+        head[number] = line
+        count -= bool(line.strip())
+    return head
 
 
 def _fields(line: str, separator: str) -> list[str]:
@@ -297,11 +276,12 @@ def _fields(line: str, separator: str) -> list[str]:
 
 def _text_chunks(path: Path, form: TextForm) -> Iterator[pd.DataFrame]:
     with _open_text(path, form) as text:
-        lines = _Lines(path, text, form)
-        names, width = _check_head(path, lines, form)
+        lines = _lines(path, text, form)
+        head = _read_head(path, lines, form)
+        names, width, whole = head.names, head.width, _Text(chain(head.lines, lines))
         try:
             for chunk in pd.read_csv(
-                cast(Any, lines), names=names, header=0, sep=form.separator, decimal=form.decimal,
+                cast(Any, whole), names=names, header=0, sep=form.separator, decimal=form.decimal,
                 na_values=[*MISSING, *form.missing], dtype={name: str for name in names if name in form.texts},
                 skipinitialspace=True, index_col=False, chunksize=CHUNK_ROWS, low_memory=False,
             ):  # fmt: skip
@@ -319,32 +299,43 @@ def _text_chunks(path: Path, form: TextForm) -> Iterator[pd.DataFrame]:
             raise InputError(f"{path}: {_too_many_fields(line, count, expected, form)}") from error
 
 
-def _check_head(path: Path, lines: _Lines, form: TextForm) -> tuple[list[str], int]:
-    """Return the names of all columns, none twice, and the number of those that the header has.
+@dataclass(frozen=True)
+class _Head:
+    """Names of all columns, none twice, the number of those that the header has, units, and lines for pandas."""
+
+    names: list[str]
+    width: int
+    units: list[str]
+    lines: list[str]
+
+
+def _read_head(path: Path, lines: Iterator[str], form: TextForm) -> _Head:
+    """Read the first lines.
 
     Refused are another separator, no header, lines above it, and rows of texts or too many fields below it. A row of
     units below it (where a mapping file could be there), and separators at the ends of the rows, are taken as such.
     """
-    rows = [(number, line, _fields(line, form.separator)) for number, line in lines.ahead(HEAD_LINES)]
+    head = _first_lines(lines, HEAD_LINES)
+    rows = [(number, _fields(line, form.separator)) for number, line in head.items() if line.strip()]
     if not rows:
         raise InputError(f"{path}: {EMPTY}")
-    at, _, names = rows[0]
-    above = _header_among([cells for _, _, cells in rows])
+    at, names = rows[0]
+    above = _header_among([cells for _, cells in rows])
     if above is None:
-        _check_separator(path, [line for _, line, _ in rows], form)
+        _check_separator(path, [head[number] for number, _ in rows], form)
     if above:
         first, last = at, rows[above - 1][0]
         where = f"lines {first}-{last}" if last > first else f"line {first}"
-        texts = f"{where} above the header (line {rows[above][0]}: {_shown(rows[above][2])})"
-        raise InputError(f"{path}: {texts}: no part of the table; {_to_skip([n for n, _, _ in rows[:above]], form)}")
+        texts = f"{where} above the header (line {rows[above][0]}: {_shown(rows[above][1])})"
+        raise InputError(f"{path}: {texts}: no part of the table; {_to_skip([n for n, _ in rows[:above]], form)}")
     if all(is_number(name) for name in names):
         raise InputError(f"{path}: its first line holds numbers; a header line with column names is needed")
-    below = [(number, cells) for number, _, cells in rows[1:]]
+    below, units = rows[1:], list[str]()
     texts_below = list(takewhile(lambda row: _holds_texts(row[1]) or _are_units(row[1]), below))
     if form.by_mapping and texts_below and _are_units(texts_below[0][1]):
         number, cells = texts_below.pop(0)
-        lines.units = [cell.strip("[]()") for cell in cells]
-        lines.replace(number, "\n")
+        units = [cell.strip("[]()") for cell in cells]
+        head[number] = "\n"
     if texts_below:
         number, cells = texts_below[0]
         raise InputError(
@@ -356,7 +347,7 @@ def _check_head(path: Path, lines: _Lines, form: TextForm) -> tuple[list[str], i
     for number, cells in below:
         if any(cells[width:]):
             raise InputError(f"{path}: {_too_many_fields(number, len(cells), width, form)}")
-    return distinct([*names, *[""] * (longest - width)]), width
+    return _Head(distinct([*names, *[""] * (longest - width)]), width, units, list(head.values()))
 
 
 def _check_separator(path: Path, lines: Sequence[str], form: TextForm) -> None:
