@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from diagnosis.recordings.cleaning import rows_text
+from diagnosis.recordings.file import RecordingFile
 from diagnosis.recordings.header_units import named_with_unit
 from diagnosis.recordings.machine import RecordedMachine
-from diagnosis.recordings.mapping import AUXILIARY, IGNORE, Column, Csv, RecordingMapping, looks_like_kelvin
-from models.base.errors import Problems, did_you_mean
+from diagnosis.recordings.mapping import AUXILIARY, IGNORE, Column, Csv, looks_like_kelvin
+from models.base.errors import did_you_mean
 from models.base.types import Array
 from models.files.numbers import numbers_of
 from models.files.table_file import copies_of
@@ -33,90 +34,74 @@ THOUSANDS = re.compile(
 CODES, CODED = 3, 0.5  # so many different impossible values, in up to this share of rows, are codes of a logger
 
 
-def is_measurable(name: str, network: RecordedMachine) -> bool:
+def is_measurable(name: str, machine: RecordedMachine) -> bool:
     """Return True for ``T_<node>`` (also of one of several sensors, ``T_<node>__<sensor>``) and ``P_loss``."""
-    known = {*(f"T_{part.name}" for part in network.parts), TOTAL_LOSS}
+    known = {*(f"T_{part.name}" for part in machine.parts), TOTAL_LOSS}
     return node_of_channel(name, known) in known
 
 
-def quantities_of(network: RecordedMachine) -> dict[str, Quantity]:
-    """Return the inputs of a network and what can be measured, by name."""
-    measured = (quantity_of(name) for name in (*(f"T_{part.name}" for part in network.parts), TOTAL_LOSS))
+def quantities_of(machine: RecordedMachine) -> dict[str, Quantity]:
+    """Return the inputs of a machine and what can be measured, by name."""
+    measured = (quantity_of(name) for name in (*(f"T_{part.name}" for part in machine.parts), TOTAL_LOSS))
     known = {q.name: q for q in measured if q is not None}
-    return known | {name: given.quantity for name, given in network.inputs.items()}
+    return known | {name: given.quantity for name, given in machine.inputs.items()}
 
 
-def match_columns(
-    present: Sequence[str],
-    time_column: str,
-    mapping: RecordingMapping,
-    network: RecordedMachine,
-    problems: Problems,
-    notes: list[str],
-) -> dict[str, Column]:
-    """Find the quantity of every column: from the mapping, then from the standard names.
+def match_columns(file: RecordingFile, present: Sequence[str], machine: RecordedMachine) -> dict[str, Column]:
+    """Find the quantity of every column: from the mapping, then from the standard names, then from names with units.
 
-    Parameters
-    ----------
-    present : sequence of str
-        Columns of the file
-    problems : Problems
-        Receives columns that are missing, unknown, named twice or misspelt
-    notes : list of str
-        Receives the columns that are not used
+    Columns that are missing, unknown, named twice or misspelt are problems of the file; those that are not used are
+    notes.
     """
-    roles = _mapped_columns(present, mapping, network, problems)
-    taken = {column.channel for column in mapping.columns.values()}
-    lacking = _standard_columns(present, mapping, network, roles, problems)
-    free = [name for name in present if name not in roles and name not in mapping.columns and name != time_column]
-    with_unit = named_with_unit(free, lacking)
+    mapping, problems, known = file.mapping, file.problems, quantities_of(machine)
+    roles = _mapped_columns(file, present, machine)
+    lacking = _standard_columns(file, present, known, roles)
+    time = file.clock.column if file.clock is not None else ""
+    rest = [name for name in present if name not in roles and name not in mapping.columns and name != time]
+    with_unit = named_with_unit(rest, lacking)
     if with_unit:
         shown = ", ".join(f"{name} ({column.quantity} in {column.unit})" for name, column in with_unit.items())
-        notes.append(f"taken from the names of columns: {shown}")
+        file.notes.append(f"taken from the names of columns: {shown}")
         roles |= with_unit
-    found = (
-        {column.quantity for column in mapping.columns.values()}
-        | {column.quantity for column in roles.values()}
-        | set(mapping.constants)
-    )
-    for signal, given in network.inputs.items():
+        rest = [name for name in rest if name not in with_unit]
+    found = {column.quantity for column in (*mapping.columns.values(), *roles.values())} | set(mapping.constants)
+    for signal, given in machine.inputs.items():
         if given.required and signal not in found and not copies_of(given.column, present):
             shown = ", ".join(other[:40] for other in sorted(present)[:20])
             problems.add(
                 f"column {given.column} is missing; it has: {shown}; name another column in a mapping file (quantity = "
                 f'"{signal}"), or give constants = {{ {signal} = ... }} there if it was constant'
             )
-    rest = [n for n in present if n not in roles and n not in mapping.columns and n != time_column]
-    replaced = [known.column for quantity, known in quantities_of(network).items()
-              if quantity in taken and known.column in rest]  # fmt: skip
+    taken = {column.channel for column in mapping.columns.values()}
+    replaced = [quantity.column for name, quantity in known.items() if name in taken and quantity.column in rest]
     if replaced:
-        notes.append(f"not used, because the mapping takes other columns for them: {', '.join(replaced)}")
-    still_lacking = [known for known in lacking if known.name not in found]
-    _report_unused([n for n in rest if n not in replaced], still_lacking, problems, notes)
+        file.notes.append(f"not used, because the mapping takes other columns for them: {', '.join(replaced)}")
+    still_lacking = [quantity for quantity in lacking if quantity.name not in found]
+    _report_unused(file, [name for name in rest if name not in replaced], still_lacking)
     return roles
 
 
 def _standard_columns(
-    present: Sequence[str], mapping: RecordingMapping, network: RecordedMachine, roles: dict[str, Column],
-    problems: Problems,
-) -> list[Quantity]:  # fmt: skip
+    file: RecordingFile, present: Sequence[str], known: Mapping[str, Quantity], roles: dict[str, Column]
+) -> list[Quantity]:
     """Add the columns of standard names that the mapping does not name to `roles`; return quantities without one."""
+    mapping, problems = file.mapping, file.problems
     taken = {column.channel for column in mapping.columns.values()}
     lacking: list[Quantity] = []
-    for quantity, known in quantities_of(network).items():
-        name = known.column
-        if name in mapping.columns or quantity in taken:
+    for quantity in known.values():
+        name = quantity.column
+        if name in mapping.columns or quantity.name in taken:
             continue
-        if quantity in mapping.constants:
+        if quantity.name in mapping.constants:
             if name in present:
                 problems.add(
-                    f"{quantity} is a constant of its mapping file, and column {name} is there as well; leave the "
+                    f"{quantity.name} is a constant of its mapping file, and column {name} is there as well; leave the "
                     f'constant out, or name the column in the mapping file with quantity = "{IGNORE}"'
                 )
         elif name in present:
-            roles[name] = Column(quantity=quantity)
+            roles[name] = Column(quantity=quantity.name)
         else:
-            lacking.append(known)
+            lacking.append(quantity)
             copies = copies_of(name, present)
             if copies:
                 problems.add(
@@ -126,10 +111,9 @@ def _standard_columns(
     return lacking
 
 
-def _mapped_columns(
-    present: Sequence[str], mapping: RecordingMapping, network: RecordedMachine, problems: Problems
-) -> dict[str, Column]:
-    known = {*quantities_of(network), AUXILIARY, IGNORE}
+def _mapped_columns(file: RecordingFile, present: Sequence[str], machine: RecordedMachine) -> dict[str, Column]:
+    mapping, problems = file.mapping, file.problems
+    known = {*quantities_of(machine), AUXILIARY, IGNORE}
     roles: dict[str, Column] = {}
     for name, column in mapping.columns.items():
         if name not in present:
@@ -145,20 +129,20 @@ def _mapped_columns(
         else:
             roles[name] = column
     for name in mapping.constants:
-        if name not in network.inputs:
-            hint = did_you_mean(name, network.inputs)
+        if name not in machine.inputs:
+            hint = did_you_mean(name, machine.inputs)
             problems.add(f"constant {name!r} of its mapping file is no input of this gearbox{hint}")
     return roles
 
 
-def _report_unused(rest: Sequence[str], lacking: Sequence[Quantity], problems: Problems, notes: list[str]) -> None:
+def _report_unused(file: RecordingFile, rest: Sequence[str], lacking: Sequence[Quantity]) -> None:
     unused = []
     by_column = {known.column: known for known in lacking}
     for name in rest:
         slip = meant(name, by_column, near=NEAR, with_kind=True)
         if slip:
             known = by_column[slip]
-            problems.add(
+            file.problems.add(
                 f"column {name[:80]} is not known; did you mean {slip!r}? Rename it if it is in {known.unit}, or name "
                 f'it in a mapping file: quantity = "{known.name}" and its unit, or "{AUXILIARY}" for something else'
             )
@@ -166,12 +150,14 @@ def _report_unused(rest: Sequence[str], lacking: Sequence[Quantity], problems: P
             unused.append(name[:80])
     if unused:
         more = f" and {len(unused) - MOST_NAMED} more" if len(unused) > MOST_NAMED else ""
-        notes.append(f"not used, being no input and no node of this gearbox: {', '.join(unused[:MOST_NAMED])}{more}")
+        file.notes.append(
+            f"not used, being no input and no node of this gearbox: {', '.join(unused[:MOST_NAMED])}{more}"
+        )
 
 
-def _numbers(cells: pd.Series, name: str, csv: Csv, problems: Problems) -> Array | None:
+def _numbers(file: RecordingFile, cells: pd.Series, name: str) -> Array | None:
     """Return a column as numbers, shape (rows,), in the unit of the file; None and a problem if a cell is no number."""
-    rows = np.asarray(cells.index) + 1
+    rows, csv, problems = np.asarray(cells.index) + 1, file.mapping.csv, file.problems
     if pd.api.types.is_bool_dtype(cells.dtype) or pd.api.types.is_datetime64_any_dtype(cells.dtype):
         problems.add(f"{name} holds {cells.dtype} values (rows {rows[0]}-{rows[-1]}), not numbers")
         return None
@@ -211,30 +197,20 @@ def _advice(text: str, csv: Csv, texts: Sequence[str], *, is_mixed: bool) -> str
 
 
 def quantity_values(
-    cells: pd.Series,
-    name: str,
-    column: Column,
-    quantity: Quantity,
-    unit_of_file: str | None,
-    csv: Csv,
-    outside: NDArray[np.bool_],
-    problems: Problems,
-    notes: list[str],
+    file: RecordingFile, cells: pd.Series, name: str, column: Column, quantity: Quantity, outside: NDArray[np.bool_]
 ) -> Array | None:
     """Return the values of an input or a measurement in the unit inside, shape (rows,); NaN where missing.
 
     Parameters
     ----------
+    file : RecordingFile
+        Receives problems and notes
     cells : Series
         Its index counts the rows of the file from 0
     name : str
         Of the column
     column : Column
         What the mapping states of it
-    unit_of_file : str or None
-        Unit that the file itself names
-    csv : Csv
-        How texts are written
     outside : array of bool, shape (rows,)
         Rows that the mapping leaves out
 
@@ -243,15 +219,15 @@ def quantity_values(
     Array or None
         None, and a problem, if the column cannot be used
     """
-    values = _numbers(cells, name, csv, problems)
-    rows = np.asarray(cells.index) + 1
-    if values is None or not _keep_valid(values, name, column, rows, problems, notes):
+    values, rows, notes = _numbers(file, cells, name), np.asarray(cells.index) + 1, file.notes
+    if values is None or not _keep_valid(file, values, name, column, rows):
         return None
     values[outside] = np.nan
+    unit_of_file = file.units.get(name)
     unit = unit_of_file if column.unit is None else column.unit
     units = units_in_files(quantity.dimension, quantity.unit)
     if unit and units and unit not in units:
-        problems.add(
+        file.problems.add(
             f"column {name} has the unit {unit!r}, which is no unit of {quantity.dimension}{did_you_mean(unit, units)}"
         )
         return None
@@ -261,12 +237,10 @@ def quantity_values(
         notes.append(f"{name}: its unit is {unit}, as in the mapping file; the file itself names {unit_of_file}")
     elif column.unit is None and (factor, offset) != (1.0, 0.0):
         notes.append(f"{name}: its unit is {unit}, as the file names it")
-    return _possible(values * (column.scale * factor) + offset, quantity, name, rows, problems, notes)
+    return _possible(file, values * (column.scale * factor) + offset, quantity, name, rows)
 
 
-def _keep_valid(
-    values: Array, name: str, column: Column, rows: NDArray[np.int64], problems: Problems, notes: list[str]
-) -> bool:
+def _keep_valid(file: RecordingFile, values: Array, name: str, column: Column, rows: NDArray[np.int64]) -> bool:
     """Replace values outside ``valid`` of the mapping by NaN; return False, and report it, if none is left."""
     low, high = column.valid or (-np.inf, np.inf)
     outside = (values < low) | (values > high)
@@ -274,19 +248,17 @@ def _keep_valid(
         where = f"in {rows_text(rows[outside])} left out"
         text = f"{name}: {int(outside.sum())} values outside {low:g} ... {high:g} {where}"
         if not np.isfinite(values[~outside]).any():
-            problems.add(
+            file.problems.add(
                 f"{text}, so that none is left: the limits 'valid' of its mapping file are in the column's own unit, "
                 "as the numbers stand in the file; correct them"
             )
             return False
-        notes.append(text)
+        file.notes.append(text)
         values[outside] = np.nan
     return True
 
 
-def _possible(
-    values: Array, quantity: Quantity, name: str, rows: NDArray[np.int64], problems: Problems, notes: list[str]
-) -> Array:
+def _possible(file: RecordingFile, values: Array, quantity: Quantity, name: str, rows: NDArray[np.int64]) -> Array:
     """Replace impossible values by NaN; many of them, or none possible, are a problem.
 
     Parameters
@@ -298,6 +270,7 @@ def _possible(
     rows : array of int, shape (rows,)
         Numbers of the rows, for messages
     """
+    problems = file.problems
     infinite = np.flatnonzero(np.isinf(values))
     if len(infinite):
         problems.add(
@@ -333,5 +306,5 @@ def _possible(
             f"{hint}; give its unit, or the valid range, in a mapping file"
         )
         return values
-    notes.append(f"{name}: {where} outside {limits} taken as missing")
+    file.notes.append(f"{name}: {where} outside {limits} taken as missing")
     return np.where(wrong, np.nan, values)

@@ -11,11 +11,9 @@ import numpy as np
 
 from diagnosis.recordings.cleaning import rows_text
 from diagnosis.recordings.cold_start import AGREE_K, is_isothermal
-from diagnosis.recordings.machine import RecordedMachine
 from diagnosis.recordings.rows import RecordedRows
-from models.base.types import Array
 from models.portable.evaluation import RPM
-from models.quantities.quantities import TOTAL_LOSS, is_total_loss
+from models.quantities.quantities import TOTAL_LOSS
 
 HOT_AIR = 50.0  # degC on average, from which ambient air is more likely in another unit
 COLD_START_K = 5.0  # by which temperatures differ in a machine that has stood for long
@@ -30,7 +28,7 @@ BRIEF_S, WARMED_K = 300.0, 15.0  # no gearbox warms that fast
 MILLISECONDS = (100.0, 200.0, 500.0, 1000.0, 2000.0)  # s from row to row that are more likely so many milliseconds
 
 
-def doubts(found: RecordedRows, network: RecordedMachine) -> list[str]:
+def doubts(found: RecordedRows) -> list[str]:
     """Return a note for each thing that is probably not meant so.
 
     Parameters
@@ -38,26 +36,22 @@ def doubts(found: RecordedRows, network: RecordedMachine) -> list[str]:
     found : RecordedRows
         In the units inside, impossible values and outliers taken out
     """
-    looked_at = (_time_in_another_unit, _hot, _one_in_degF, _off_when_cold, _colder_than_ambient, _far_rows)
-    return [note for each in looked_at for note in each(found, network)] + [*_loss_and_power(found)]
+    looked_at = (
+        _time_in_another_unit, _hot, _one_in_degF, _off_when_cold, _colder_than_ambient, _far_rows, _loss_and_power,
+    )  # fmt: skip
+    return [note for each in looked_at for note in each(found)]
 
 
-def _temperatures(found: RecordedRows, network: RecordedMachine) -> dict[str, Array]:
-    measured = {quantity: found.values[quantity] for quantity in found.measured(network) if not is_total_loss(quantity)}
-    return {quantity: values for quantity, values in measured.items() if np.isfinite(values).any()}
+def _firsts(found: RecordedRows) -> dict[str, float]:
+    return {quantity: float(values[np.isfinite(values)][0]) for quantity, values in found.temperatures.items()}
 
 
-def _firsts(found: RecordedRows, network: RecordedMachine) -> dict[str, float]:
-    measured = _temperatures(found, network)
-    return {quantity: float(values[np.isfinite(values)][0]) for quantity, values in measured.items()}
-
-
-def _time_in_another_unit(found: RecordedRows, network: RecordedMachine) -> Iterator[str]:
+def _time_in_another_unit(found: RecordedRows) -> Iterator[str]:
     if found.clock is None or found.clock.is_date:
         return
     name, steps = found.clock.column, np.diff(found.seconds)
     length, step = float(found.seconds[-1] - found.seconds[0]), float(np.median(steps))
-    for quantity, values in _temperatures(found, network).items():
+    for quantity, values in found.temperatures.items():
         low, high = np.nanquantile(values, [0.05, 0.95])
         if length < BRIEF_S and high - low > WARMED_K:
             yield (
@@ -70,7 +64,7 @@ def _time_in_another_unit(found: RecordedRows, network: RecordedMachine) -> Iter
         yield f"{name} advances by {step:g} s from row to row: {advice}"
 
 
-def _hot(found: RecordedRows, network: RecordedMachine) -> Iterator[str]:
+def _hot(found: RecordedRows) -> Iterator[str]:
     advice = 'if the file has another unit, name it in a mapping (unit = "degF")'
     ambient = found.values.get("T_ambient", np.zeros(0))
     if np.isfinite(ambient).any() and np.nanmean(ambient) > HOT_AIR:
@@ -78,7 +72,7 @@ def _hot(found: RecordedRows, network: RecordedMachine) -> Iterator[str]:
         yield f"{name}: {np.nanmean(ambient):.0f} degC on average is hot for ambient air; {advice}"
     if "T_ambient" in found.names:  # in another unit it would be hot as well
         return
-    firsts = _firsts(found, network).values()
+    firsts = _firsts(found).values()
     if len(firsts) > 1 and min(firsts) > HOT_AIR and max(firsts) - min(firsts) < COLD_START_K:
         yield (
             f"all temperatures begin at {min(firsts):.0f} to {max(firsts):.0f} degC, alike as in a machine that has "
@@ -86,8 +80,8 @@ def _hot(found: RecordedRows, network: RecordedMachine) -> Iterator[str]:
         )
 
 
-def _one_in_degF(found: RecordedRows, network: RecordedMachine) -> Iterator[str]:
-    measured = _temperatures(found, network)
+def _one_in_degF(found: RecordedRows) -> Iterator[str]:
+    measured = found.temperatures
     for quantity, values in measured.items():
         others = [other for name, other in measured.items() if name != quantity]
         if not others or found.roles[quantity].unit is not None:
@@ -104,9 +98,9 @@ def _one_in_degF(found: RecordedRows, network: RecordedMachine) -> Iterator[str]
             )
 
 
-def _off_when_cold(found: RecordedRows, network: RecordedMachine) -> Iterator[str]:
+def _off_when_cold(found: RecordedRows) -> Iterator[str]:
     ambient = found.values.get("T_ambient", np.zeros(0))
-    firsts = _firsts(found, network)
+    firsts = _firsts(found)
     if not np.isfinite(ambient).any() or not is_isothermal([*firsts.values()], float(ambient[np.isfinite(ambient)][0])):
         return
     middle = float(np.median([*firsts.values()]))
@@ -123,11 +117,11 @@ def _off_when_cold(found: RecordedRows, network: RecordedMachine) -> Iterator[st
             )
 
 
-def _colder_than_ambient(found: RecordedRows, network: RecordedMachine) -> Iterator[str]:
+def _colder_than_ambient(found: RecordedRows) -> Iterator[str]:
     if "T_ambient" not in found.names:
         return
     ambient = found.values["T_ambient"]
-    for quantity, values in _temperatures(found, network).items():
+    for quantity, values in found.temperatures.items():
         both = np.isfinite(values) & np.isfinite(ambient)
         below = float(np.mean(ambient[both] - values[both])) if both.any() else 0.0
         if below > COLDER_K:
@@ -152,9 +146,9 @@ def _loss_and_power(found: RecordedRows) -> Iterator[str]:
         )
 
 
-def _far_rows(found: RecordedRows, network: RecordedMachine) -> Iterator[str]:
+def _far_rows(found: RecordedRows) -> Iterator[str]:
     """Note rows of an input far beyond all others, which may be codes of a logger."""
-    for name, given in network.inputs.items():
+    for name, given in found.machine.inputs.items():
         size = np.abs(found.values[name])
         is_code = np.isin(size, CODES)
         others = size[np.isfinite(size) & ~is_code]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial, reduce
 from itertools import chain
 from pathlib import Path
@@ -46,6 +46,9 @@ class RecordingFile:
         Start of an MDF file since 1970, [s]
     units : mapping of column to str
         Units that the file itself names: as in MDF, in brackets in the header of a text, or in a row below it
+    problems : Problems
+    notes : list of str
+        What was assumed or not used
     """
 
     path: Path
@@ -59,6 +62,7 @@ class RecordingFile:
     start: float | None
     units: Mapping[str, str]
     problems: Problems
+    notes: list[str] = field(default_factory=list)
 
     @property
     def parts(self) -> tuple[Part, ...]:

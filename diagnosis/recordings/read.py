@@ -176,14 +176,14 @@ def read_recording(
             f"; it goes from {moment_text(first_s, clock)} to {moment_text(last_s, clock)}" if last_s >= first_s else ""
         )
         raise InputError(f"{found.path}: has {rows} rows{where}{span}; a recording has {FEWEST_ROWS} or more")
-    _add_unrecorded(found, network)
+    _add_unrecorded(found)
     stated, usual = files[0].mapping.max_gap_s, GAP_STEPS * float(np.median(np.diff(found.seconds)))
     gap = max(SHORTEST_GAP_S, usual) if stated is None else stated
-    resolutions = {quantity: resolution_of(found.values[quantity]) for quantity in found.measured(network)}
-    _remove_spikes(found, network, gap)
-    _note_stuck(found, network)
-    found.notes[:0] = doubts(found, network)  # the first notes are printed
-    found = _with_known_inputs(found, network, gap)
+    resolutions = {quantity: resolution_of(found.values[quantity]) for quantity in found.measured}
+    _remove_spikes(found, gap)
+    _note_stuck(found)
+    found.notes[:0] = doubts(found)  # the first notes are printed
+    found = _with_known_inputs(found, gap)
     segments = _segments(found, gap)
     seconds, clock = found.seconds, files[0].clock
     since_1970 = 0.0 if clock is not None and clock.is_date else files[0].start
@@ -198,7 +198,7 @@ def read_recording(
         from_s=float(seconds[0]),
         clock=clock,
         rows=found.rows,
-        inputs={name: found.values[name] for name in found.inputs(network)},
+        inputs={name: found.values[name] for name in found.inputs},
         channels=tuple(
             Channel(
                 name=quantity.removeprefix("T_"),
@@ -211,13 +211,13 @@ def read_recording(
                 gain_sd=role.gain_sd,
                 column=found.names[quantity],
             )
-            for quantity in found.measured(network)
+            for quantity in found.measured
             for role in [found.roles[quantity]]
         ),
         segments=segments,
         tolerances={
             name: stated
-            for name in found.inputs(network)
+            for name in found.inputs
             if name in found.roles
             for stated in [found.roles[name].bias_sd if name == "T_ambient" else found.roles[name].gain_sd]
             if stated is not None
@@ -255,19 +255,20 @@ def _names(paths: Sequence[str | Path]) -> list[str]:
 # ---------------------------------------------------------------------- cleaning
 
 
-def _add_unrecorded(found: RecordedRows, network: RecordedMachine) -> None:
+def _add_unrecorded(found: RecordedRows) -> None:
     """Add the definition's values of inputs that were not recorded."""
-    for name, given in network.inputs.items():
+    for name, given in found.machine.inputs.items():
         if name not in found.values:
             found.values[name] = np.full(len(found.seconds), given.default)
             found.assumed.append(name)
             found.notes.append(f"{given.column} was not recorded; {given.default:g} is assumed, as in the definition")
 
 
-def _remove_spikes(found: RecordedRows, network: RecordedMachine, gap: float) -> None:
-    driving = [name for name, given in network.inputs.items() if given.required] or list(network.inputs)
+def _remove_spikes(found: RecordedRows, gap: float) -> None:
+    inputs = found.machine.inputs
+    driving = [name for name, given in inputs.items() if given.required] or list(inputs)
     steady = steady_rows({"time": found.seconds * 0.0} | {name: found.values[name] for name in driving})
-    known = quantities_of(network)
+    known = quantities_of(found.machine)
     pieces = time_pieces(found.seconds, gap)
     for quantity, values in found.values.items():
         if is_total_loss(quantity):
@@ -282,9 +283,8 @@ def _remove_spikes(found: RecordedRows, network: RecordedMachine, gap: float) ->
             found.notes.append(f"{name}: {int(wrong.sum())} outliers and dropouts in {where} taken as missing")
 
 
-def _note_stuck(found: RecordedRows, network: RecordedMachine) -> None:
-    temperatures = {q: found.values[q] for q in found.measured(network) if not is_total_loss(q)}
-    for quantity, (first, end, other, moved) in stuck_rows(found.seconds, temperatures).items():
+def _note_stuck(found: RecordedRows) -> None:
+    for quantity, (first, end, other, moved) in stuck_rows(found.seconds, found.temperatures).items():
         hours = (found.seconds[end - 1] - found.seconds[first]) / 3600.0
         found.notes.append(
             f"{found.names[quantity]} stays at {found.values[quantity][first]:g} degC for {hours:.1f} h (rows "
@@ -292,7 +292,7 @@ def _note_stuck(found: RecordedRows, network: RecordedMachine) -> None:
         )
 
 
-def _with_known_inputs(found: RecordedRows, network: RecordedMachine, gap: float) -> RecordedRows:
+def _with_known_inputs(found: RecordedRows, gap: float) -> RecordedRows:
     """Bridge short holes of the inputs, and drop the rows without inputs.
 
     Raises
@@ -304,9 +304,9 @@ def _with_known_inputs(found: RecordedRows, network: RecordedMachine, gap: float
     time, rows = found.seconds, found.rows
     usable = np.ones(len(time), dtype=bool)
     partial = []
-    for name in found.inputs(network):
+    for name in found.inputs:
         values, column = found.values[name], found.names.get(name, name)
-        is_slow = network.inputs[name].quantity.is_temperature or name == "air_speed"
+        is_slow = found.machine.inputs[name].quantity.is_temperature or name == "air_speed"
         longest = SLOW_GAPS * gap if is_slow else gap
         filled, known = bridged(time, values, longest)
         found.values[name] = filled

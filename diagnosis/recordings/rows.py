@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -19,6 +19,7 @@ from diagnosis.recordings.mapping import AUXILIARY, IGNORE, Column
 from diagnosis.recordings.time_axis import ISO, ISO_NAMES, STANDARD, Clock, Part, check_time, moment_text
 from models.base.errors import InputError
 from models.base.types import Array
+from models.quantities.quantities import is_total_loss
 
 MOST_FOOTERS = 20  # rows
 
@@ -39,6 +40,7 @@ class RecordedRows:
         Its column, and what the mapping states of it
     """
 
+    machine: RecordedMachine
     path: Path
     files: list[Path]
     clock: Clock | None
@@ -50,17 +52,26 @@ class RecordedRows:
     assumed: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
-    def inputs(self, network: RecordedMachine) -> list[str]:
-        """Return the inputs in it."""
-        return [name for name in self.values if name in network.inputs]
+    @property
+    def inputs(self) -> list[str]:
+        """The inputs in it."""
+        return [name for name in self.values if name in self.machine.inputs]
 
-    def measured(self, network: RecordedMachine) -> list[str]:
-        """Return the measured quantities in it."""
-        return [name for name in self.values if is_measurable(name, network) and name not in network.inputs]
+    @property
+    def measured(self) -> list[str]:
+        """The measured quantities in it."""
+        inputs = self.machine.inputs
+        return [name for name in self.values if is_measurable(name, self.machine) and name not in inputs]
+
+    @property
+    def temperatures(self) -> dict[str, Array]:
+        """Measured temperatures that have a value, shape (rows,) each, [degC]."""
+        measured = {name: self.values[name] for name in self.measured if not is_total_loss(name)}
+        return {name: values for name, values in measured.items() if np.isfinite(values).any()}
 
 
 def read_rows(
-    file: RecordingFile, parts: Sequence[Part], first_s: float, network: RecordedMachine, *, to_compare: bool
+    file: RecordingFile, parts: Sequence[Part], first_s: float, machine: RecordedMachine, *, to_compare: bool
 ) -> RecordedRows:
     """Read the rows of the parts: numbers in the units inside, without impossible values.
 
@@ -69,17 +80,15 @@ def read_rows(
     InputError
         With all problems of the file.
     """
-    clock, problems, notes = file.clock, file.problems, list[str]()
-    table = file.table(parts, first_s)
-    table = _without_footer(table, file, notes)
+    clock, problems, notes = file.clock, file.problems, file.notes
+    table = _without_footer(file.table(parts, first_s), file)
     seconds = file.seconds(table)
     if len(table) > 1 and (np.diff(seconds) < 0.0).all():
         notes.append("its newest row comes first: the rows are turned round, and keep their numbers of the file")
         table = table[::-1]
         seconds = file.seconds(table)
-    found = RecordedRows(
-        path=file.path, files=[file.path], clock=clock, seconds=seconds, rows=np.asarray(table.index) + 1, notes=notes
-    )
+    found = RecordedRows(machine=machine, path=file.path, files=[file.path], clock=clock, seconds=seconds,
+                         rows=np.asarray(table.index) + 1, notes=notes)  # fmt: skip
     if len(table) == 0:
         problems.stop_if_any()
         return found
@@ -91,29 +100,25 @@ def read_rows(
             notes.append(
                 f"{clock.column} has no time zone: it is taken as UTC, and dates marked UTC are the file's own"
             )
-    present = [str(column) for column in table.columns]
-    known = quantities_of(network)
-    roles = match_columns(present, clock.column if clock else "", file.mapping, network, problems, notes)
-    for name, role in roles.items():
+    known = quantities_of(machine)
+    for name, role in match_columns(file, [str(column) for column in table.columns], machine).items():
         if role.quantity not in (AUXILIARY, IGNORE):
             found.names[role.channel], found.roles[role.channel] = name, role
             outside = ~file.in_rows_of(name, role, seconds, first_s)
-            quantity = known[role.quantity]
-            values = quantity_values(table[name], name, role, quantity, file.units.get(name), file.mapping.csv,
-                                     outside, problems, notes)  # fmt: skip
+            values = quantity_values(file, table[name], name, role, known[role.quantity], outside)
             if values is not None:
                 found.values[role.channel] = values
     found.values |= {name: np.full(len(table), value) for name, value in file.mapping.constants.items()}
-    if to_compare and not any(q.startswith("T_") and is_measurable(q, network) for q in found.names):
+    if to_compare and not any(q.startswith("T_") and is_measurable(q, machine) for q in found.names):
         problems.add(
             "no temperature was measured: a column T_<node>_degC is needed, of the nodes "
-            + ", ".join(part.name for part in network.parts)
+            + ", ".join(part.name for part in machine.parts)
         )
     problems.stop_if_any()
     return found
 
 
-def _without_footer(table: pd.DataFrame, file: RecordingFile, notes: list[str]) -> pd.DataFrame:
+def _without_footer(table: pd.DataFrame, file: RecordingFile) -> pd.DataFrame:
     """Leave out rows at the end that hold a text in place of the time, and nothing else."""
     end = table.iloc[1:][-MOST_FOOTERS:]
     if file.clock is None or not len(end):
@@ -124,7 +129,7 @@ def _without_footer(table: pd.DataFrame, file: RecordingFile, notes: list[str]) 
     footers = int(np.logical_and.accumulate(is_text[::-1]).sum())
     if footers:
         first = str(times.iloc[len(end) - footers])[:40]
-        notes.append(
+        file.notes.append(
             f"{rows_text(np.asarray(end.index[-footers:]) + 1)} at the end with a text only ({first!r}) left out"
         )
     return table.iloc[: len(table) - footers]
@@ -155,10 +160,10 @@ def joined(tables: Sequence[RecordedRows]) -> RecordedRows:
         f"{table.path.name} (rows {rows.min()}-{rows.max()})" for table, rows in zip(tables, numbered, strict=True)
     )
     notes = [f"{table.path.name}: {note}" for table in tables for note in table.notes]
-    return RecordedRows(
+    return replace(
+        tables[0],
         path=tables[0].path.with_name("+".join(table.path.name for table in tables)),
         files=[table.path for table in tables],
-        clock=tables[0].clock,
         seconds=np.concatenate([table.seconds for table in tables]),
         rows=np.concatenate(numbered),
         values={
