@@ -105,14 +105,14 @@ def _range_of(trained: Training) -> str:
 
 def _fmu(path: Path, correction: CorrectionFile | None) -> Model:
     from builder.drive.driver import drive_fmu  # imports fmpy; the full model need not wait for it
-    from builder.drive.machine_of_fmu import fmu_machine, fmu_memories, fmu_nodes, refuse_other_correction
+    from builder.drive.machine_of_fmu import fmu_machine
 
     machine, found = fmu_machine(path), None
     if correction is not None:
         found = correction.parse()
-        refuse_other_correction(path, found, source=str(correction.path))
+        machine.refuse_other_correction(found, source=str(correction.path))
         try:
-            found.check_instruments(fmu_nodes(path), machine.inputs)
+            found.check_instruments(machine.nodes, machine.inputs)
         except InputError as error:
             raise InputError("\n".join(f"{correction.path}: {line}" for line in str(error).splitlines())) from error
 
@@ -125,7 +125,7 @@ def _fmu(path: Path, correction: CorrectionFile | None) -> Model:
         domain="the surrogate's training domain",
         run=run,
         correction=found,
-        memories=fmu_memories(path),
+        memories=machine.memories,
     )
 
 

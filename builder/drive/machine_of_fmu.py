@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,71 +22,77 @@ from models.quantities.units import UNITS, conversion, find_unit
 NEEDED = {"initial.uniform": "parameter", "initial.T": "parameter"}  # of every FMU of this project
 
 
-def fmu_machine(path: Path) -> DescribedMachine:
-    """Return what an FMU knows of recordings: inputs, nodes with a start temperature, the usual mapping.
+@dataclass(frozen=True, kw_only=True)
+class FmuMachine(DescribedMachine):
+    """A machine as an FMU describes it; its parts are the nodes with a start temperature.
+
+    Attributes
+    ----------
+    nodes : tuple of str
+        Boundaries among them
+    memories : mapping of str to float
+        Of the laws, with their start values
+    definition : str
+        Hash of the values of its definition; empty for an FMU of an earlier version
+    words : str
+        Description, which names the correction that it was built with
+    """
+
+    path: Path
+    nodes: tuple[str, ...]
+    memories: Mapping[str, float]
+    definition: str
+    words: str
+
+    def refuse_other_correction(self, correction: Correction, *, source: str) -> None:
+        """Refuse a correction of another machine, and one that changes the machine if it was not built with it.
+
+        Raises
+        ------
+        InputError
+        """
+        made_for = correction.gearbox
+        if made_for is not None and self.definition and made_for.sha256 != self.definition:
+            raise InputError(
+                f"{self.path}: is of definition {self.definition[:12]}, but {source} was made for {made_for.name!r} "
+                f"with definition {made_for.sha256[:12]}; use the FMU of that machine, or diagnose again"
+            )
+        if correction.has_physics and correction.words not in self.words:
+            raise InputError(
+                f"{self.path}: was not built with {source}, which changes the physics; build it again with build-fmu "
+                f"--correction {source}"
+            )
+
+
+def fmu_machine(path: Path) -> FmuMachine:
+    """Return the machine that an FMU describes.
 
     Raises
     ------
     InputError
         If the file is not an FMU of this project.
     """
-    variables = description_of(path).modelVariables
+    description = description_of(path)
+    variables = description.modelVariables
     with damage_reported(path):
         recorded = recorded_columns(path)
     inputs = [_input(v, recorded.required) for v in variables if v.causality == "input"]
-    return DescribedMachine(
+    return FmuMachine(
         inputs={given.name: given for given in inputs},
         parts=tuple(Part(name) for name in start_variables(variables)),
         recording=recorded.mapping,
+        path=path,
+        nodes=tuple(temperature_variables(variables)),
+        memories={name: float(v.start) for name, v in memory_variables(variables).items()},
+        definition=recorded.definition,
+        words=description.description or "",
     )
-
-
-def fmu_nodes(path: Path) -> tuple[str, ...]:
-    """Return the nodes of an FMU, boundaries among them.
-
-    Raises
-    ------
-    InputError
-        If the file is not an FMU of this project.
-    """
-    return tuple(temperature_variables(description_of(path).modelVariables))
-
-
-def fmu_memories(path: Path) -> dict[str, float]:
-    """Return the memories of the laws of an FMU, with their start values.
-
-    Raises
-    ------
-    InputError
-        If the file is not an FMU of this project.
-    """
-    return {name: float(v.start) for name, v in memory_variables(description_of(path).modelVariables).items()}
 
 
 def memory_variables(variables: Iterable[Any]) -> dict[str, Any]:
     """Start variables of the memories, by the name of the memory."""
     before = "initial.state."
     return {v.name.removeprefix(before).strip("'"): v for v in variables if v.name.startswith(before)}
-
-
-def refuse_other_correction(path: Path, correction: Correction, *, source: str) -> None:
-    """Refuse a correction of another machine, and one that changes the machine if the FMU was not built with it.
-
-    Raises
-    ------
-    InputError
-    """
-    made_for, own = correction.gearbox, recorded_columns(path).definition
-    if made_for is not None and own and made_for.sha256 != own:
-        raise InputError(
-            f"{path}: is of definition {own[:12]}, but {source} was made for {made_for.name!r} with definition "
-            f"{made_for.sha256[:12]}; use the FMU of that machine, or diagnose again"
-        )
-    if correction.has_physics and correction.words not in (description_of(path).description or ""):
-        raise InputError(
-            f"{path}: was not built with {source}, which changes the physics; build it again with build-fmu "
-            f"--correction {source}"
-        )
 
 
 def _input(variable: Any, required: Sequence[str]) -> Input:
