@@ -17,6 +17,7 @@ from models.base.types import Array
 
 INK, LINE = "#1f2328", "#dfe3e8"
 FONT_PX = 12
+DASHES = ("solid", "dash", "dot", "dashdot")
 LETTERS = 42  # of a line on a phone
 MOST_POINTS = 700  # of a curve
 MOST_OF_ALL = 160_000  # points of all curves of a chart: some 2 MB of the page
@@ -164,14 +165,6 @@ def row_titles(texts: Sequence[str]) -> list[dict[str, Any]]:
          "yref": f"{axis('y', row)} domain", "showarrow": False, "font": {"size": FONT_PX}}
         for row, text in enumerate(texts, 1)
     ]  # fmt: skip
-
-
-def menu(buttons: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """A list to choose from above a figure, if there is a choice."""
-    if len(buttons) < 2:
-        return {}
-    return {"updatemenus": [{"buttons": list(buttons), "x": 0.0, "xanchor": "left", "y": 1.0, "yanchor": "top",
-                             "pad": {"t": -120, "b": 0}, "bgcolor": "white", "font": {"size": FONT_PX}}]}  # fmt: skip
 
 
 def wrapped(text: str) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from plotly.subplots import make_subplots
 
-from diagnosis.report.chart import INK, MOST_POINTS, Chart, curve_points, dressed, row_titles, single, thinned, wrapped
+from diagnosis.report.chart import DASHES, INK, Chart, curve_points, dressed, row_titles, single, thinned, wrapped
 from diagnosis.report.wording import clause, name, short_title, time_scale
 from diagnosis.results.first_screen import date_told
 from diagnosis.results.number_format import share
@@ -25,7 +25,6 @@ GRADES: Mapping[str, tuple[str, str]] = {  # colour and pattern: apart in print 
 }
 MOST_NAMES = 12
 BAR_PX, HEAT_PX, TIMELINE_PX, LEGEND_PX = 30, 230, 34, 34
-DASHES = ("solid", "dash", "dot", "dashdot")
 BINS = 12
 FOLLOWS = 0.8  # share of the variance of a heat that a signal must explain to be called what drives it
 SHOWN_AGAINST = 2  # findings
@@ -176,7 +175,7 @@ def heat_of_findings(diagnosis: Diagnosis) -> Chart | None:
     for index, finding in enumerate(warm):
         line = {"color": colours.get(finding.node, INK), "width": 2.0, "dash": DASHES[index % len(DASHES)]}
         for number, (recording, (time, heat)) in enumerate(finding.heat.items()):
-            x, y = curve_points((time + offsets[recording]) / scale, heat, MOST_POINTS)
+            x, y = curve_points((time + offsets[recording]) / scale, heat)
             figure.add_scatter(x=x, y=y, mode="lines", line=line, name=wrapped(short_title(finding)),
                                legendgroup=str(index), showlegend=number == 0,
                                hovertemplate=f"{recording}: %{{y:.4g}} W<extra></extra>", row=1, col=1)  # fmt: skip
@@ -186,7 +185,7 @@ def heat_of_findings(diagnosis: Diagnosis) -> Chart | None:
     titles = ["<b>Heat over time</b>, W"]
     for row, (finding, label, x, heat) in enumerate(drivers, 2):
         order = np.argsort(x)
-        few_x, few_y = thinned(x[order], heat[order], MOST_POINTS)
+        few_x, few_y = thinned(x[order], heat[order])
         figure.add_scatter(x=single(few_x), y=single(few_y), mode="markers", showlegend=False,
                            marker={"color": colours.get(finding.node, INK), "size": 4, "opacity": 0.6},
                            hovertemplate="%{x:.4g}: %{y:.4g} W<extra></extra>", row=row, col=1)  # fmt: skip

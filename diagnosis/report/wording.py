@@ -13,8 +13,6 @@ DAY, HOUR, MINUTE = 86_400.0, 3600.0, 60.0
 KEYS = ("T_ambient_degC", "bias_sd")  # that advice tells to write into a file
 WEEKS_S, LONG_S, SHORT_S = 14.0 * DAY, 2.0 * HOUR, 5.0 * MINUTE  # above: in days, in hours; below: in seconds
 UNITS = {"1": "", "degC": "°C", "W/degC": "W/K", "N.m": "N m", "rpm": "1/min"}
-LOSS = TOTAL_LOSS
-
 COURSES = {"step": "from a date on", "for_a_while": "for a while", "over_hours": "over the hours"}
 MOST_WINDOWS = 12  # of a recording that are told
 # Shown when hovering a term, and all together at the end of the page.
@@ -84,7 +82,7 @@ def name(identifier: str) -> str:
     >>> name("housing_lower"), name("P_loss"), name("torque_gain_step")
     ('housing lower', 'total loss', 'torque gain from a date on')
     """
-    return "total loss" if identifier == LOSS else _spelled(identifier)
+    return "total loss" if identifier == TOTAL_LOSS else _spelled(identifier)
 
 
 def headline(mechanism: str, place: str) -> str:
@@ -119,12 +117,8 @@ def _spelled(text: str) -> str:
     """Names in words; the course of an effect in time, which is the end of its name, too."""
     for ending, words in COURSES.items():
         text = re.sub(rf"_{ending}\b", f" {words}", text)
-    parts = re.split(rf"\b({'|'.join(KEYS)})\b", text)  # keys and columns are typed as they are
-    return "".join(part if part in KEYS else _words(part) for part in parts)
-
-
-def _words(text: str) -> str:
-    return re.sub(r"\bT_ambient\b", "ambient temperature", text).replace("__", " ").replace("_", " ")
+    text = re.sub(r"\bT_ambient\b", "ambient temperature", text)
+    return re.sub(rf"\b({'|'.join(KEYS)})\b|__?", lambda found: found[1] or " ", text)  # keys are typed as they are
 
 
 def clause(text: str) -> str:

@@ -161,7 +161,7 @@ def test_pieces_of_one_recording_are_told_apart_and_counted_once() -> None:
     diagnosis = replace(base, courses=(base.courses[0], base.courses[0], base.courses[2]))
     titles = ["hold_1 (held out)", "train_1 (learned from)"]
     assert [one.title for one in recordings_of(diagnosis)] == titles
-    assert len(recordings_of(diagnosis)[1].run.time) == 2 * len(base.courses[0].time)
+    assert len(recordings_of(diagnosis)[1].time) == 2 * len(base.courses[0].time)
     assert "from 2 recordings" in Text(page(diagnosis)).plain
 
 
