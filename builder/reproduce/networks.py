@@ -80,9 +80,9 @@ def network_scheme(study: Study) -> Iterator[Part]:
             ", ".join(network.outputs),
             " x ".join(str(len(biases)) for biases in network.biases[:2]),
             str(sum(use.network == network.name for use in study.surrogate.uses)),
-            f"{seconds:.1f}",
+            f"{study.ours.seconds_by_network[network.name]:.1f}",
         )
-        for network, seconds in ((one.network, one.seconds) for one in study.ours.networks)
+        for network in study.ours.losses.networks
     ]
     header = ("network", "inputs", "outputs", "hidden", "used", "trained in s")
     yield Table("Our networks", header, rows, texts=True)

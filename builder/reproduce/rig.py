@@ -46,10 +46,10 @@ def design_scheme(study: Study) -> Iterator[Part]:
     rows = [
         (
             "full model on sampled points",
-            f"{trained.preset.samples} points for each of {len(trained.networks)} networks",
+            f"{trained.preset.samples} points for each of {len(trained.losses.networks)} networks",
         ),
         ("training, validation, test", "80 %, 10 %, 10 %"),
-        ("networks", ", ".join(one.network.name.replace("_", " ") for one in trained.networks)),
+        ("networks", ", ".join(network.name.replace("_", " ") for network in trained.losses.networks)),
         ("sampling and training together", f"{trained.seconds:.1f} s"),
     ]
     yield Table("Ours", ("step", "here"), rows, texts=True)

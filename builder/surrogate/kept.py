@@ -69,7 +69,6 @@ def kept_or_trained(
     if found is not None:
         return TrainingResult(
             losses=SurrogateLosses.from_dict(found["losses"]),
-            networks=(),
             report=tuple(ErrorReport(**row) for row in found["report"]),
             preset=chosen,
             seed=seed,

@@ -153,18 +153,12 @@ def _normal_equations(
     return hessian, gradient
 
 
-@dataclass(frozen=True)
-class Step:
-    """State after one accepted step."""
-
-    parameters: Array
-    loss: float  # mean square residual of the training rows
-
-
 def minimise(
     shapes: LayerShapes, parameters: Array, rows: Array, targets: Array, pool: ThreadPoolExecutor
-) -> Iterator[Step]:
-    """Levenberg-Marquardt with Nielsen's damping [1]_: yields the state after each step; ends where none improves it.
+) -> Iterator[tuple[Array, float]]:
+    """Levenberg-Marquardt with Nielsen's damping [1]_: yields parameters and mean square residual after each step.
+
+    Ends where no step improves them.
 
     References
     ----------
@@ -199,7 +193,7 @@ def minimise(
         damping = max(damping * max(1.0 / 3.0, 1.0 - (2.0 * gain - 1.0) ** 3), DAMPING_LOWEST)
         growth = 2.0
         parameters, loss = parameters + step, candidate_loss
-        yield Step(parameters, loss)
+        yield parameters, loss
 
 
 class LevenbergMarquardtRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
@@ -318,11 +312,12 @@ class _Run:
             step = next(self._steps, None)
             if step is None:
                 return
-            outputs = predict_rows(self._shapes.unpack(step.parameters), self._held_rows)
+            parameters, loss = step
+            outputs = predict_rows(self._shapes.unpack(parameters), self._held_rows)
             error = float(np.mean((outputs - self._held_targets) ** 2))
-            self.losses.append(step.loss)
+            self.losses.append(loss)
             self.errors.append(error)
             if error < self.best_error:
-                self.best, self.best_error = step.parameters, error
+                self.best, self.best_error = parameters, error
             if error < self._mark * (1.0 - tolerance):
                 self._mark, self._marked_at = error, len(self.losses)

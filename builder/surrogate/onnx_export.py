@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import onnx
 import onnxruntime
-from onnx import TensorProto, helper
+from onnx import TensorProto, helper, numpy_helper
 
 from builder.surrogate.doe import random_points
 from builder.surrogate.train import TrainingResult
@@ -167,8 +167,7 @@ class _Graph:
         if array.ndim == 1 and dtype is np.float64:
             array = array[None]
         name = f"c{len(self.constants)}"
-        kind = TensorProto.INT64 if dtype is np.int64 else TensorProto.DOUBLE
-        self.constants.append(helper.make_tensor(name, kind, array.shape, array.tobytes(), raw=True))
+        self.constants.append(numpy_helper.from_array(array, name))
         return name
 
     def add(self, operator: str, *inputs: str, output: str | None = None, **attributes: Any) -> str:

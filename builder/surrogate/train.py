@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -55,40 +56,32 @@ class ErrorReport:
 
 
 @dataclass(frozen=True, kw_only=True)
-class TrainedNetwork:
-    """A network, and how long its training took, [s]."""
-
-    network: Network
-    seconds: float
-
-
-@dataclass(frozen=True, kw_only=True)
 class TrainingResult:
     """A trained surrogate and how good it is.
 
     Attributes
     ----------
     losses : SurrogateLosses
-    networks : tuple of TrainedNetwork
-        Empty if it was trained in an earlier build
     report : tuple of ErrorReport
     preset : Preset
     seed : int
     definition_hash, gearbox : str
     seconds : float
         That the training took, [s]
+    seconds_by_network : mapping of str to float
+        That every network took, [s]; empty if it was trained in an earlier build
     origin : str
         In words, where the networks are from
     """
 
     losses: SurrogateLosses
-    networks: tuple[TrainedNetwork, ...]
     report: tuple[ErrorReport, ...]
     preset: Preset
     seed: int
     definition_hash: str
     gearbox: str
     seconds: float
+    seconds_by_network: Mapping[str, float] = field(default_factory=dict)
     origin: str = "trained now"
 
     def report_of(self, network: str) -> tuple[ErrorReport, ...]:
@@ -162,11 +155,11 @@ def train_surrogate(
     training = f"training the networks {', '.join(spec.name for spec in specs)}"
     progress(training, 0, len(specs))
     items = [(spec, chosen, viscosity, *table, seed) for spec, table in zip(specs, tables, strict=True)]
-    trained = tuple(run_parallel(_train, items, jobs=jobs, progress=partial(progress, training)))
+    networks, seconds = zip(*run_parallel(_train, items, jobs=jobs, progress=partial(progress, training)), strict=True)
     losses = SurrogateLosses(
         components=model.components,
         temperature_nodes=model.temperature_nodes,
-        networks=tuple(one.network for one in trained),
+        networks=networks,
         uses=tuple(use for spec in specs for use in spec.uses),
         speed_bounds=domain.speed_rpm,
         torque_bounds=domain.torque_Nm,
@@ -176,13 +169,13 @@ def train_surrogate(
     progress(f"judging on {chosen.judged} random points")
     return TrainingResult(
         losses=losses,
-        networks=trained,
         report=judge(losses, model, count=chosen.judged, seed=seed),
         preset=chosen,
         seed=seed,
         definition_hash=gearbox.hash,
         gearbox=gearbox.name,
         seconds=time.perf_counter() - begin,
+        seconds_by_network={spec.name: took for spec, took in zip(specs, seconds, strict=True)},
     )
 
 
@@ -259,7 +252,8 @@ def _training_points(spec: NetworkSpec, preset: Preset, viscosity: tuple[float, 
 
 def _train(
     spec: NetworkSpec, preset: Preset, viscosity: tuple[float, float], points: Array, losses: Array, seed: int
-) -> TrainedNetwork:
+) -> tuple[Network, float]:
+    """Train a network; return it, and the time that this took, [s]."""
     begin = time.perf_counter()
     # Nobody reads the rest: errors are judged on other points. To train on all points would change every network.
     x, _, y, _ = train_test_split(points, losses, test_size=TEST_SHARE, random_state=seed)
@@ -282,4 +276,4 @@ def _train(
         networks.append(
             fit_network(regressor, x, y[:, columns], spec=spec, outputs=outputs, powers=powers, viscosity=viscosity)
         )
-    return TrainedNetwork(network=joined_network(networks), seconds=time.perf_counter() - begin)
+    return joined_network(networks), time.perf_counter() - begin

@@ -73,7 +73,7 @@ def test_every_step_lowers_the_loss_and_a_known_network_is_recovered():
     near = teacher + 0.05 * random.normal(size=shapes.count)
     with ThreadPoolExecutor(1) as pool:
         steps = minimise(shapes, near, rows, targets, pool)
-        losses = [step.loss for _, step in zip(range(200), steps, strict=False)]
+        losses = [loss for _, (_, loss) in zip(range(200), steps, strict=False)]
     assert all(after < before for before, after in itertools.pairwise(losses))
     assert losses[-1] < 1e-20
 

@@ -119,5 +119,5 @@ def test_faulty_options_are_refused(options, message):
 def test_outputs_with_hidden_units_for_each_make_one_network():
     hidden = {"mesh_sliding": (4, 3), "mesh_rolling": (3, 2), "no_load": (2, 2), "bearing": (2, 2)}
     preset = replace(PRESETS["default"], samples=300, judged=20, max_iter=15, starts=1, hidden=hidden)
-    mesh = train_surrogate(load_gearbox("fzg"), preset=preset).networks[0]
-    assert [len(bias) for bias in mesh.network.biases] == [7, 5, 2]
+    mesh = train_surrogate(load_gearbox("fzg"), preset=preset).losses.networks[0]
+    assert [len(bias) for bias in mesh.biases] == [7, 5, 2]
