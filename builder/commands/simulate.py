@@ -244,7 +244,7 @@ def _read_as_files(files: tuple[Path, ...], gearbox: str | None) -> tuple[Path, 
     """Return the files that are read; a part of a recording counts as its file."""
     if len(files) > 2 or (len(files) == 2) == (gearbox is not None):
         raise InputError("simulate takes FMU CYCLE, or --gearbox NAME|FILE and CYCLE")
-    from diagnosis.recordings.time_axis import split_path
+    from diagnosis.recordings.names import split_path
 
     return (*(files[:-1] if gearbox is None else ()), *split_path(files[-1])[0])
 

@@ -18,8 +18,8 @@ from builder.base import console
 from builder.base.progress import progress
 from diagnosis.decision.settings import Settings
 from diagnosis.diagnose_recordings import diagnose
+from diagnosis.recordings.names import RECORDING_KINDS
 from diagnosis.recordings.read import ByRole, read_by_role
-from diagnosis.recordings.time_axis import RECORDING_KINDS
 from diagnosis.report.write import files_left_over, write_files
 from diagnosis.results.result import Diagnosis
 from models.assembly.gearbox import Gearbox

@@ -9,9 +9,10 @@ from diagnosis.recordings.columns import quantities_of
 from diagnosis.recordings.header_units import named_with_unit, unit_of_name
 from diagnosis.recordings.machine import RecordedMachine
 from diagnosis.recordings.mapping import RecordingMapping, mapping_beside, mapping_of_definition
-from diagnosis.recordings.read import name_parts, read_recording
+from diagnosis.recordings.names import split_path
+from diagnosis.recordings.read import read_recording
 from diagnosis.recordings.recording import Recording
-from diagnosis.recordings.time_axis import ISO_NAMES, STANDARD, moment_text, split_path
+from diagnosis.recordings.time_axis import ISO_NAMES, STANDARD, moment_text
 from models.base.errors import InputError
 from models.base.types import Array
 from models.files.cycle import Cycle
@@ -84,7 +85,7 @@ def _what_makes_a_recording(text: Path, needed: Set[str], network: RecordedMachi
     """
     if not text.name.lower().endswith(KINDS) or len(split_path(text)[0]) > 1:
         return GIVEN
-    names, own = set(column_names(text)), mapping_beside(text, name_parts(text)[1])
+    names, own = set(column_names(text)), mapping_beside(text)
     if own is not None:
         # The mapping may be there for other files of the folder.
         as_it_reads = column_names(text, own.text_form)

@@ -24,7 +24,8 @@ from diagnosis.recordings.mapping import (
     reduced_to,
 )
 from diagnosis.recordings.mdf import read_mdf
-from diagnosis.recordings.time_axis import ISO, RECORDING_KINDS, Clock, Part, clock_of, holds_dates, inside, part_of
+from diagnosis.recordings.names import RECORDING_KINDS, Part, part_of
+from diagnosis.recordings.time_axis import ISO, Clock, clock_of, holds_dates, inside
 from models.base.errors import InputError, Problems, did_you_mean
 from models.base.types import Array
 from models.files.paths import check_file, kind_of
@@ -52,7 +53,6 @@ class RecordingFile:
     """
 
     path: Path
-    stem: str
     mapping: RecordingMapping
     chunks: Iterator[pd.DataFrame]
     clock: Clock | None
@@ -125,7 +125,7 @@ def open_recording(path: Path, mapping: Path | None, usual: RecordingMapping) ->
     """
     kind = kind_of(path, RECORDING_KINDS)
     check_file(path)
-    own = mapping_beside(path, stem_of(path)) if mapping is None else read_mapping(mapping)
+    own = mapping_beside(path) if mapping is None else read_mapping(mapping)
     found = usual if own is None else own
     problems = Problems(path)
     start: float | None = None
@@ -148,7 +148,7 @@ def open_recording(path: Path, mapping: Path | None, usual: RecordingMapping) ->
     except InputError as error:
         problems.add(str(error))
     file = RecordingFile(
-        path=path, stem=stem_of(path), mapping=found, chunks=chain([head], chunks), clock=clock, first_s=np.nan,
+        path=path, mapping=found, chunks=chain([head], chunks), clock=clock, first_s=np.nan,
         start=start, units=units, problems=problems,
     )  # fmt: skip
     file.first_s = float(file.seconds(head[:1])[0]) if len(head) else np.nan
@@ -197,13 +197,6 @@ def set_to_one_clock(files: Sequence[RecordingFile]) -> None:
         if file.start is not None and first.start is not None and not file.clock.is_date:
             file.shift_s = file.start - first.start
             file.first_s += file.shift_s
-
-
-def stem_of(path: Path) -> str:
-    """Return the name of a file without its ending."""
-    kinds = sorted(RECORDING_KINDS, key=len, reverse=True)
-    kind = next((kind for kind in kinds if path.name.lower().endswith(kind)), "")
-    return path.name[: len(path.name) - len(kind)]
 
 
 def sha256_of(files: Sequence[Path]) -> str:

@@ -42,6 +42,7 @@ from zoneinfo import ZoneInfo
 import pandas as pd
 from pydantic import Field, field_validator, model_validator
 
+from diagnosis.recordings.names import stem_of
 from models.base.errors import InputError, did_you_mean
 from models.definition.messages import validate_section
 from models.definition.sections import Name, NotNegative, Positive, Section, Text
@@ -288,18 +289,18 @@ def read_mapping(path: Path) -> RecordingMapping:
     return validate_section(RecordingMapping, values, file=str(path))
 
 
-def mapping_beside(recording: Path, stem: str) -> RecordingMapping | None:
+def mapping_beside(recording: Path) -> RecordingMapping | None:
     """Read the mapping file next to a recording; None without one. See :func:`mapping_file`."""
-    found = mapping_file(recording, stem)
+    found = mapping_file(recording)
     return None if found is None else read_mapping(found)
 
 
-def mapping_file(recording: Path, stem: str) -> Path | None:
+def mapping_file(recording: Path) -> Path | None:
     """Return the mapping file next to a recording: ``<stem>.toml``, else ``mapping.toml``; None without one.
 
     A gearbox definition that has the stem of the recording is not a mapping file.
     """
-    own, shared = recording.with_name(f"{stem}.toml"), recording.with_name(FOLDER_FILE)
+    own, shared = recording.with_name(f"{stem_of(recording)}.toml"), recording.with_name(FOLDER_FILE)
     if own.is_file():
         values = toml_file.parse(toml_file.read_text(own), file=str(own))
         if not any(key in values for key in DEFINITION_KEYS):

@@ -22,12 +22,13 @@ from diagnosis.recordings.cleaning import (
 )
 from diagnosis.recordings.columns import quantities_of
 from diagnosis.recordings.doubts import doubts
-from diagnosis.recordings.file import open_recording, set_to_one_clock, sha256_of, stem_of
+from diagnosis.recordings.file import open_recording, set_to_one_clock, sha256_of
 from diagnosis.recordings.machine import RecordedMachine
 from diagnosis.recordings.mapping import mapping_of_definition
+from diagnosis.recordings.names import names_of, split_path, stem_of
 from diagnosis.recordings.recording import Channel, Recording
 from diagnosis.recordings.rows import RecordedRows, joined, read_rows
-from diagnosis.recordings.time_axis import moment_text, split_path
+from diagnosis.recordings.time_axis import moment_text
 from models.base.errors import InputError, Problems
 from models.quantities.quantities import is_total_loss, node_of_channel
 
@@ -54,7 +55,7 @@ def read_recordings(
     paths : str, Path, or sequence of them
         One entry per recording: a file (.csv, .csv.gz, .parquet, .mf4); several files of one recording, joined in the
         order of time, ``FILE+FILE``; or a part of either, ``FILE@start..end`` (see
-        :class:`diagnosis.recordings.time_axis.Part`)
+        :class:`diagnosis.recordings.names.Part`)
     machine : Gearbox, ThermalNetwork or DescribedMachine
         Defines which nodes and inputs there are
     mapping : Path or None
@@ -91,7 +92,7 @@ def read_recordings(
     paths = [paths] if isinstance(paths, str | Path) else paths
     recordings: list[Recording] = []
     problems: list[str] = []
-    for path, name in zip(paths, _names(paths), strict=True):
+    for path, name in zip(paths, names_of(paths), strict=True):
         try:
             recordings.append(read_recording(path, network, name=name, mapping=mapping))
         except InputError as error:
@@ -189,7 +190,7 @@ def read_recording(
     since_1970 = 0.0 if clock is not None and clock.is_date else files[0].start
     epoch = datetime(1970, 1, 1, tzinfo=UTC)
     return Recording(
-        name=name or files[0].stem,
+        name=name or stem_of(paths[0]),
         path=found.path,
         files=tuple(found.files),
         sha256=sha256_of(found.files),
@@ -227,29 +228,6 @@ def read_recording(
         session=files[0].mapping.session or "",
         parts=tuple(part.name for part in network.parts),
     )
-
-
-def name_parts(text: str | Path) -> tuple[str, str, str]:
-    """Return folder, stem, and part as words for the name of a recording.
-
-    Examples
-    --------
-    >>> name_parts("rig_1/train_1.csv.gz"), name_parts("a.csv+b.csv@0..3600")
-    (('rig_1', 'train_1', ''), ('', 'a', '0_3600'))
-    """
-    paths, parts = split_path(text)
-    part = str(text).rpartition("@")[2].replace("..", "_") if parts else ""
-    return paths[0].parent.name, stem_of(paths[0]), part.replace(":", "").replace("/", "")
-
-
-def _names(paths: Sequence[str | Path]) -> list[str]:
-    """Return short names of recordings, made different by their folder, their part, or a number if need be."""
-    split = [name_parts(path) for path in paths]
-    for form in ("{stem}", "{folder}_{stem}", "{stem}_{part}", "{folder}_{stem}_{part}"):
-        names = [form.format(stem=stem, folder=folder, part=part).strip("_") for folder, stem, part in split]
-        if len(set(names)) == len(names):
-            return names
-    return [f"{stem}_{number}" for number, (_, stem, _) in enumerate(split, start=1)]
 
 
 # ---------------------------------------------------------------------- cleaning

@@ -16,7 +16,8 @@ from diagnosis.recordings.columns import is_measurable, match_columns, quantitie
 from diagnosis.recordings.file import RecordingFile
 from diagnosis.recordings.machine import RecordedMachine
 from diagnosis.recordings.mapping import AUXILIARY, IGNORE, Column
-from diagnosis.recordings.time_axis import ISO, ISO_NAMES, STANDARD, Clock, Part, check_time, moment_text
+from diagnosis.recordings.names import Part
+from diagnosis.recordings.time_axis import ISO, ISO_NAMES, STANDARD, Clock, check_time, moment_text
 from models.base.errors import InputError
 from models.base.types import Array
 from models.quantities.quantities import is_total_loss

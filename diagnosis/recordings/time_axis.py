@@ -1,15 +1,13 @@
-"""Time column of a recording, and the names ``FILE+FILE@start..end`` of files and parts."""
+"""Time column of a recording."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 from math import floor
-from pathlib import Path
 from typing import cast
-from zoneinfo import ZoneInfo
 
 import numpy as np
 import pandas as pd
@@ -18,20 +16,15 @@ from numpy.typing import NDArray
 from diagnosis.recordings.date_forms import forms_of, time_advice
 from diagnosis.recordings.header_units import unit_of_name
 from diagnosis.recordings.mapping import CLOCK_TIME
+from diagnosis.recordings.names import DATE, ISO_TIME, Part, seconds_of
 from models.base.errors import InputError, Problems
 from models.base.types import Array
 from models.files.numbers import numbers_of
-from models.files.paths import KINDS, is_file
 from models.quantities.units import units_in_files
 
-RECORDING_KINDS = (*KINDS, ".mf4", ".mdf")
 STANDARD = "time_s"
 ISO = "iso8601"
 ISO_NAMES = ("time", "time_utc", "timestamp", "datetime")
-_DATE = r"\d{4}-\d{2}-\d{2}"
-_ISO = re.compile(
-    rf"{_DATE}(?:[T ]\d{{2}}:\d{{2}}(?::\d{{2}}(?:[.,]\d{{1,9}})?)?)?(?P<zone>Z|[+-]\d{{2}}(?::?\d{{2}})?)?"
-)
 SECONDS = ("s", "sec", "sek", "seconds")  # as rows of units write them
 SHORTEST_STEP = 1e-3  # s; no temperature is recorded faster, so smaller steps are another unit
 COARSE = 0.2  # of the steps: equal times are no slips any more
@@ -41,103 +34,6 @@ FEW = 0.01  # share of rows without time that may be lines outside the table
 EXCEL_DAYS = (20000.0, 80000.0)  # numbers of the days from 1954 to 2119 in Excel
 LAST_YEAR = 2200  # later is the date of a clock that was not set
 LONGEST_DATES = 3e9  # s from the first to the last: a century
-
-
-@dataclass(frozen=True, kw_only=True)
-class Part:
-    """A part of a file's time, from `start` up to but without `end`; None is the first or the last row.
-
-    Numbers are seconds: of a time column in seconds as it stands there, else since the first row. A date without a time
-    of day includes that day. Dates without a zone are those of the clock of the file, UTC unless it states another one.
-
-    Examples
-    --------
-    >>> part_of("0..36000"), part_of("2017-09-01..").start
-    (Part(start=0.0, end=36000.0), datetime.datetime(2017, 9, 1, 0, 0))
-    """
-
-    start: float | datetime | None
-    end: float | datetime | None
-
-
-def part_of(text: str) -> Part:
-    """Read ``start..end``.
-
-    Raises
-    ------
-    InputError
-        If it is written otherwise, mixes seconds and dates, or ends before it starts.
-    """
-    first, dots, last = text.partition("..")
-    if not dots or not (first.strip() or last.strip()):
-        raise InputError(f"{text!r} names no part; write start..end, e.g. 0..3600 (seconds) or 2017-09-01..2017-10-31")
-    start, end = _moment(first.strip(), end=False), _moment(last.strip(), end=True)
-    if start is not None and end is not None:
-        if isinstance(start, datetime) != isinstance(end, datetime):
-            raise InputError(f"{text!r} mixes seconds and dates; use one of them for both ends")
-        if not _seconds(start) < _seconds(end):
-            raise InputError(f"{text!r} ends before it starts")
-    return Part(start=start, end=end)
-
-
-def split_path(text: str | Path) -> tuple[tuple[Path, ...], tuple[Part, ...]]:
-    """Split ``FILE+FILE@start..end`` into its files and the part; a file whose own name has a + or @ stays as it is.
-
-    Raises
-    ------
-    InputError
-        If the text after the ``@`` is not a part.
-
-    Examples
-    --------
-    >>> [path.name for path in split_path("day_1.csv+day_2.csv@0..3600")[0]]
-    ['day_1.csv', 'day_2.csv']
-    """
-    if is_file(Path(text)):
-        return (Path(text),), ()
-    files, at, part = str(text).rpartition("@")
-    if not at or not files.lower().endswith(RECORDING_KINDS) or part.lower().endswith(RECORDING_KINDS):
-        return _split_files(str(text)), ()
-    try:
-        return _split_files(files), (part_of(part),)
-    except InputError as error:
-        raise InputError(f"{text}: {error}") from error
-
-
-def _split_files(text: str) -> tuple[Path, ...]:
-    files: list[str] = []
-    begun = ""
-    for piece in text.split("+"):
-        begun = f"{begun}+{piece}" if begun else piece
-        if begun.lower().endswith(RECORDING_KINDS):
-            files.append(begun)
-            begun = ""
-    return tuple(map(Path, [*files, begun] if begun or not files else files))
-
-
-def _moment(text: str, *, end: bool) -> float | datetime | None:
-    if not text:
-        return None
-    if _ISO.fullmatch(text):
-        try:
-            moment = datetime.fromisoformat(text)
-        except ValueError as error:
-            raise InputError(f"{text!r} is no date: {error}") from error
-        return moment + timedelta(days=1) if end and re.fullmatch(_DATE, text) else moment
-    try:
-        number = float(text)
-    except ValueError:
-        number = float("nan")
-    if not np.isfinite(number):
-        raise InputError(f"{text!r} is neither seconds nor a date as 2017-09-01T08:00:00Z")
-    return number
-
-
-def _seconds(moment: float | datetime, zone: str | None = None) -> float:
-    """Seconds, of a date since 1970; `zone` is that of a date that states none, UTC for None."""
-    if not isinstance(moment, datetime):
-        return moment
-    return (moment if moment.tzinfo else moment.replace(tzinfo=ZoneInfo(zone or "UTC"))).timestamp()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -291,13 +187,13 @@ def holds_dates(values: pd.Series) -> bool:
     if pd.api.types.is_numeric_dtype(values.dtype):
         return False
     first = values.dropna().head(20).astype(str).str.strip()
-    return bool(first.map(lambda text: bool(_ISO.fullmatch(text))).any())
+    return bool(first.map(lambda text: bool(ISO_TIME.fullmatch(text))).any())
 
 
 def _may_be_time(dates: pd.Series) -> bool:
     """Return False for one date in all rows, and for days, whose time is in another column."""
     first, last = str(dates.iloc[0]).strip(), str(dates.iloc[-1]).strip()
-    return first != last and not re.fullmatch(_DATE, first)
+    return first != last and not re.fullmatch(DATE, first)
 
 
 def inside(seconds: Array, parts: Sequence[Part], clock: Clock, first: float) -> NDArray[np.bool_]:
@@ -316,7 +212,7 @@ def inside(seconds: Array, parts: Sequence[Part], clock: Clock, first: float) ->
                 continue
             if isinstance(moment, datetime) and not clock.is_date:
                 raise InputError(f"a part is named by date, but column {clock.column} holds seconds; name seconds")
-            at = _seconds(moment, clock.zone) + (first if clock.is_date and not isinstance(moment, datetime) else 0.0)
+            at = seconds_of(moment, clock.zone) + (first if clock.is_date and not isinstance(moment, datetime) else 0.0)
             with np.errstate(invalid="ignore"):
                 within &= (seconds < at) if is_end else (seconds >= at)
         chosen |= within
@@ -431,7 +327,7 @@ def _check_time_unit(name: str, seconds: Array, step: float, clock: Clock, probl
 
 def _zones(values: pd.Series) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Cells that are a date with a time zone, and those that are one without, shape (rows,) each."""
-    found = [_ISO.fullmatch(text.strip()) for text in values.astype(str).tolist()]  # quicker than a Series
+    found = [ISO_TIME.fullmatch(text.strip()) for text in values.astype(str).tolist()]  # quicker than a Series
     aware = np.array([match is not None and match["zone"] is not None for match in found], dtype=bool)
     return aware, np.array([match is not None for match in found], dtype=bool) & ~aware
 

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from diagnosis.recordings.as_cycle import read_cycle_or_recording
-from diagnosis.recordings.time_axis import split_path
+from diagnosis.recordings.names import split_path
 from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.errors import InputError
 from models.files.cycle_file import read_cycle_and_start

@@ -12,12 +12,12 @@ import numpy as np
 from diagnosis.proof.injection.csv_text import CsvText, read_csv_text
 from diagnosis.recordings.cleaning import resolution_of
 from diagnosis.recordings.columns import quantities_of
-from diagnosis.recordings.file import open_recording, stem_of
+from diagnosis.recordings.file import open_recording
 from diagnosis.recordings.mapping import mapping_file, mapping_of_definition
+from diagnosis.recordings.names import part_of, split_path, stem_of
 from diagnosis.recordings.read import read_recording
 from diagnosis.recordings.recording import Recording
 from diagnosis.recordings.rows import RecordedRows, read_rows
-from diagnosis.recordings.time_axis import part_of, split_path
 from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError
 from models.base.types import Array
@@ -179,6 +179,6 @@ def read_real_recording(text: str, gearbox: Gearbox) -> RealRecording:
     return RealRecording(
         path=path, stem=stem_of(path), part=text.rpartition("@")[2] if parts else "", first_s=first_s,
         text=read_csv_text(path, file.mapping.text_form).with_rows(found.rows), found=found, recording=recording,
-        mapping=mapping_file(path, stem_of(path)), factors=factors,
+        mapping=mapping_file(path), factors=factors,
         nodes=tuple(part.name for part in network.parts),
     )  # fmt: skip

@@ -9,9 +9,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from diagnosis.recordings.names import part_of
 from diagnosis.recordings.read import read_recordings
 from diagnosis.recordings.recording import Recording
-from diagnosis.recordings.time_axis import Clock, inside, part_of
+from diagnosis.recordings.time_axis import Clock, inside
 from models.base.errors import InputError
 from models.simulation.thermal_network import ThermalNetwork
 

@@ -11,10 +11,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from diagnosis.recordings.names import part_of
 from diagnosis.recordings.read import named_apart, read_by_role, read_recordings
 from diagnosis.recordings.recording import Recording
 from diagnosis.recordings.shared_rows import check_shared_rows
-from diagnosis.recordings.time_axis import part_of
 from models.base.errors import InputError
 from models.quantities.units import INSIDE, units_in_files
 from models.simulation.thermal_network import ThermalNetwork
