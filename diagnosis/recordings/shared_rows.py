@@ -6,15 +6,15 @@ from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
-from pandas.util import hash_array
+from pandas.util import hash_pandas_object
 
 from diagnosis.recordings.recording import Recording
 from diagnosis.recordings.time_axis import moment_text
 from models.base.errors import InputError
 
 SHARED_ROWS, SHARED_SHARE = 20, 0.2  # distinct rows that two recordings have in common
-MIX = np.uint64(0x9E3779B97F4A7C15)  # odd and without a pattern: joins hashes
 
 
 def check_shared_rows(
@@ -68,8 +68,7 @@ def _distinct_rows(recording: Recording) -> NDArray[np.uint64]:
     """Hash every four rows as measured, without the time: two of them are never equal by chance."""
     columns = list(recording.inputs.values())[:2]
     columns += [channel.values for channel in sorted(recording.channels, key=lambda channel: channel.name)]
-    row = np.zeros(len(columns[0]), dtype=np.uint64)
-    for column in columns:
-        row = row * MIX + hash_array(np.round(np.nan_to_num(column, nan=-1e9), 3) + 0.0)
-    four = ((row[:-3] * MIX + row[1:-2]) * MIX + row[2:-1]) * MIX + row[3:]
-    return np.unique(four[row[:-3] != row[3:]])
+    values = np.round(np.nan_to_num(np.column_stack(columns), nan=-1e9), 3) + 0.0  # no -0.0
+    row = hash_pandas_object(pd.DataFrame(values), index=False).to_numpy()
+    four = pd.DataFrame({0: row[:-3], 1: row[1:-2], 2: row[2:-1], 3: row[3:]})
+    return np.unique(hash_pandas_object(four[four[0] != four[3]], index=False).to_numpy())

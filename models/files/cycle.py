@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from models.base.errors import InputError, Problems
 from models.base.types import Array
 from models.columns.columns import Columns
+from models.files.numbers import is_number
 from models.files.table_file import MOST_ROWS
 from models.quantities.column_names import meant
 from models.quantities.quantities import GEARBOX_INPUTS, Input, column_of_input, implausible
@@ -187,14 +188,6 @@ def _rounded_up(seconds: float) -> str:
     return f"{np.ceil(seconds / unit) * unit:g}"
 
 
-def _is_number(value: object) -> bool:
-    try:
-        float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        return False
-    return True
-
-
 def _check_names(have: list[str], wanted: list[str], needed: list[str], problems: Problems) -> None:
     for column in needed:
         if column not in have:
@@ -221,7 +214,7 @@ def _numbers(values: ArrayLike, column: str, problems: Problems) -> Array | None
     try:
         numbers = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError):
-        row, value = next((row, value) for row, value in enumerate(np.ravel(values), start=1) if not _is_number(value))
+        row, value = next((row, value) for row, value in enumerate(np.ravel(values), start=1) if not is_number(value))
         problems.add(f"{column} is {str(value)[:40]!r} at row {row}; numbers are needed")
         return None
     if numbers.ndim != 1:

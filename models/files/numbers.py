@@ -10,11 +10,11 @@ import pandas as pd
 from models.base.types import Array
 
 
-def is_number(text: str) -> bool:
-    """Return True for a number with a decimal point, also for ``nan`` and ``inf``."""
+def is_number(cell: object) -> bool:
+    """Return True for a number, and for its text with a decimal point; also for ``nan`` and ``inf``."""
     try:
-        float(text)
-    except ValueError:
+        float(cell)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
         return False
     return True
 
