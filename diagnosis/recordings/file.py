@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial, reduce
 from itertools import chain
 from pathlib import Path
@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from diagnosis.recordings.header_units import units_in_brackets
 from diagnosis.recordings.mapping import (
-    TIME_UNITS,
     Column,
     RecordingMapping,
     Time,
@@ -25,8 +24,8 @@ from diagnosis.recordings.mapping import (
 )
 from diagnosis.recordings.mdf import read_mdf
 from diagnosis.recordings.names import RECORDING_KINDS, Part, part_of
-from diagnosis.recordings.time_axis import ISO, Clock, clock_of, holds_dates, inside
-from models.base.errors import InputError, Problems, did_you_mean
+from diagnosis.recordings.time_axis import Clock, clock_of, inside
+from models.base.errors import InputError, Problems
 from models.base.types import Array
 from models.files.paths import check_file, kind_of
 from models.files.table_file import column_units, read_chunks, together, without
@@ -144,7 +143,7 @@ def open_recording(path: Path, mapping: Path | None, usual: RecordingMapping) ->
     if found.time is not None:
         chunks, head = map(partial(_with_one_time, time=found.time), chunks), _with_one_time(head, found.time)
     try:
-        clock = _clock(head, found, units)
+        clock = clock_of(head, found, units)
     except InputError as error:
         problems.add(str(error))
     file = RecordingFile(
@@ -162,25 +161,6 @@ def _with_one_time(table: pd.DataFrame, time: Time) -> pd.DataFrame:
     texts = [table[name].astype(str).str.strip() for name in time.columns]
     joined = reduce(lambda first, then: first + " " + then, texts).where(table[list(time.columns)].notna().all(axis=1))
     return table.drop(columns=list(time.columns)).assign(**{time.name: joined})
-
-
-def _clock(table: pd.DataFrame, mapping: RecordingMapping, units: Mapping[str, str]) -> Clock:
-    time, csv = mapping.time, mapping.csv
-    if time is None:
-        return replace(clock_of(table, units), decimal=csv.decimal, thousands=csv.thousands)
-    if time.name not in table.columns:
-        columns = [str(column) for column in table.columns]
-        missing = next(name for name in time.columns if name not in columns)
-        raise InputError(f"column {missing} of [time] in its mapping file is missing{did_you_mean(missing, columns)}")
-    named = units.get(time.name, "s")
-    usual = ISO if holds_dates(table[time.name]) else named if named in TIME_UNITS else "s"
-    unit = ISO if pd.api.types.is_datetime64_any_dtype(table[time.name].dtype) else time.unit or usual
-    if time.zone is not None and unit in TIME_UNITS and unit != ISO:
-        raise InputError(
-            f"column {time.name} counts {unit}, which have no time zone: give the form of its dates as unit, or "
-            "leave zone out of its mapping file"
-        )
-    return Clock(column=time.name, unit=unit, zone=time.zone, decimal=csv.decimal, thousands=csv.thousands)
 
 
 def set_to_one_clock(files: Sequence[RecordingFile]) -> None:

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from diagnosis.recordings.date_forms import forms_of, time_advice
 from diagnosis.recordings.header_units import unit_of_name
-from diagnosis.recordings.mapping import CLOCK_TIME
+from diagnosis.recordings.mapping import CLOCK_TIME, TIME_UNITS, RecordingMapping
 from diagnosis.recordings.names import DATE, ISO_TIME, Part, seconds_of
-from models.base.errors import InputError, Problems
+from models.base.errors import InputError, Problems, did_you_mean
 from models.base.types import Array
 from models.files.numbers import numbers_of
 from models.quantities.units import units_in_files
@@ -129,11 +129,8 @@ def moment_text(seconds: float, clock: Clock | None) -> str:
     return datetime.fromtimestamp(whole, tz=UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
-def clock_of(table: pd.DataFrame, units: Mapping[str, str]) -> Clock:
-    """Find the time column without a mapping.
-
-    It is ``time_s``, else ISO 8601 times under a usual name, times with their unit, or the only column of ISO 8601
-    times.
+def clock_of(table: pd.DataFrame, mapping: RecordingMapping, units: Mapping[str, str]) -> Clock:
+    """Find the time column: that of the mapping, else see :func:`_usual_clock`.
 
     Parameters
     ----------
@@ -144,6 +141,30 @@ def clock_of(table: pd.DataFrame, units: Mapping[str, str]) -> Clock:
     ------
     InputError
         If there is no such column, or the unit of its numbers is unknown.
+    """
+    time, csv = mapping.time, mapping.csv
+    if time is None:
+        return replace(_usual_clock(table, units), decimal=csv.decimal, thousands=csv.thousands)
+    if time.name not in table.columns:
+        columns = [str(column) for column in table.columns]
+        missing = next(name for name in time.columns if name not in columns)
+        raise InputError(f"column {missing} of [time] in its mapping file is missing{did_you_mean(missing, columns)}")
+    named = units.get(time.name, "s")
+    usual = ISO if holds_dates(table[time.name]) else named if named in TIME_UNITS else "s"
+    unit = ISO if pd.api.types.is_datetime64_any_dtype(table[time.name].dtype) else time.unit or usual
+    if time.zone is not None and unit in TIME_UNITS and unit != ISO:
+        raise InputError(
+            f"column {time.name} counts {unit}, which have no time zone: give the form of its dates as unit, or "
+            "leave zone out of its mapping file"
+        )
+    return Clock(column=time.name, unit=unit, zone=time.zone, decimal=csv.decimal, thousands=csv.thousands)
+
+
+def _usual_clock(table: pd.DataFrame, units: Mapping[str, str]) -> Clock:
+    """Find the time column without a mapping.
+
+    It is ``time_s``, else ISO 8601 times under a usual name, times with their unit, or the only column of ISO 8601
+    times.
     """
     columns = [str(column) for column in table.columns]
     if STANDARD in columns:
