@@ -11,7 +11,7 @@ import plotly.graph_objects as go
 
 from diagnosis.report.chart import INK, Chart, dressed
 from diagnosis.report.network_layout import places_of
-from diagnosis.report.wording import name
+from diagnosis.report.wording import name, short_title
 from diagnosis.results.number_format import share
 from diagnosis.results.result import Diagnosis
 from diagnosis.results.result_parts import NO_CLAIM, Finding
@@ -37,12 +37,15 @@ class Marks:
 
     Attributes
     ----------
+    network : ThermalNetwork
+        To be drawn
     nodes, links : mapping of str to (str, float)
         Name to a text about it, and its probability
     names : mapping of str to str
         Nodes that are called otherwise than in the network
     """
 
+    network: ThermalNetwork
     nodes: Mapping[str, tuple[str, float]] = field(default_factory=dict)
     links: Mapping[str, tuple[str, float]] = field(default_factory=dict)
     names: Mapping[str, str] = field(default_factory=dict)
@@ -51,33 +54,28 @@ class Marks:
         """A node as a reader knows it."""
         return name(self.names.get(node, node))
 
-    def told(self, network: ThermalNetwork) -> list[tuple[str, str, float]]:
+    @property
+    def told(self) -> list[tuple[str, str, float]]:
         """Parts, the text about them, and its probability."""
         parts = [(self.called(node), *said) for node, said in self.nodes.items()]
-        ends = {link.name: " to ".join(map(self.called, link.nodes)) for link in network.links}
+        ends = {link.name: " to ".join(map(self.called, link.nodes)) for link in self.network.links}
         return parts + [(f"path from {ends[link]}", *said) for link, said in self.links.items()]
 
 
-def corrected(diagnosis: Diagnosis) -> ThermalNetwork:
-    """The network with the findings; faults of instruments leave it as it is."""
+def marks(diagnosis: Diagnosis) -> Marks:
+    """The network with the findings, with their places and those of unexplained heat; the first at a part counts."""
     network = diagnosis.network
-    for finding in diagnosis.findings:
+    for finding in diagnosis.findings:  # faults of instruments leave it as it is
         if finding.term is not None:
             network = finding.term.apply(network)
-    return network
-
-
-def marks(diagnosis: Diagnosis) -> Marks:
-    """Places of the findings and of unexplained heat, with their probabilities; the first that names a part counts."""
-    network = corrected(diagnosis)
     added = set(network.node_names) - set(diagnosis.network.node_names)
     nodes: dict[str, tuple[str, float]] = {}
     links: dict[str, tuple[str, float]] = {}
     names: dict[str, str] = {}
     pointed: list[tuple[str, tuple[str, float]]] = []
     for finding in diagnosis.findings:
-        title = " or ".join(map(name, finding.tie_set or (finding.law,)))
-        said = (f"acts like {name(finding.law)}" if finding.acts_like else title, finding.sureness)
+        title = f"acts like {name(finding.law)}" if finding.acts_like else short_title(finding)
+        said = (title, finding.sureness)
         pointed += [(target, said) for target in _targets(finding)]
         if finding.term is not None and finding.term.kind == "link":
             label = finding.term.label
@@ -90,20 +88,21 @@ def marks(diagnosis: Diagnosis) -> Marks:
         found_nodes, found_links = _meant(network, target)
         nodes |= {node: said for node in found_nodes if node not in nodes}
         links |= {link: said for link in found_links if link not in links}
-    return Marks(nodes=nodes, links=links, names=names)
+    return Marks(network=network, nodes=nodes, links=links, names=names)
 
 
 def network_with_places(diagnosis: Diagnosis) -> Chart:
     """The network as corrected, with thermometers, and the places of the findings."""
-    marked, network = marks(diagnosis), corrected(diagnosis)
+    marked = marks(diagnosis)
+    network = marked.network
     measured = {channel for course in diagnosis.courses for channel in course.measured}
-    told = "; ".join(f"{part}: {said}, probability {share(p)}" for part, said, p in marked.told(network))
+    told = "; ".join(f"{part}: {said}, probability {share(p)}" for part, said, p in marked.told)
     thermometers = sorted(
         {name(node_of_channel(channel, network.node_names)) for channel in measured}
         & set(map(name, network.node_names))
     )
     return Chart(
-        name="network", title="The network and the place", figure=drawn(network, diagnosis.network, measured, marked),
+        name="network", title="The network and the place", figure=drawn(marked, diagnosis.network, measured),
         note="Full: has a thermometer. Ring: no thermometer. Square: surroundings. Heat is made at the top and leaves "
              "at the bottom." + (MARKED if told else ""),
         alt=f"Thermal network of {len(network.node_names)} nodes and {len(network.links)} links; with a thermometer: "
@@ -111,18 +110,17 @@ def network_with_places(diagnosis: Diagnosis) -> Chart:
     )  # fmt: skip
 
 
-def drawn(network: ThermalNetwork, nominal: ThermalNetwork, measured: Iterable[str], marked: Marks) -> go.Figure:
-    """The network as a figure.
+def drawn(marked: Marks, nominal: ThermalNetwork, measured: Iterable[str]) -> go.Figure:
+    """The network of the marks as a figure.
 
     Parameters
     ----------
-    network : ThermalNetwork
-        To be drawn
     nominal : ThermalNetwork
         As delivered; nodes and links that it lacks are drawn as new
     measured : iterable of str
         Channels: nodes with a thermometer, or with one of several
     """
+    network = marked.network
     place = {node: (x, -float(row)) for node, (x, row) in places_of(network, nominal).items()}
     rows = 1.0 - min(y for _, y in place.values())
     figure = go.Figure()

@@ -51,7 +51,7 @@ def page(diagnosis: Diagnosis) -> str:
         claims=diagnosis.verdict not in NO_CLAIM,
         evidence=_evidence(diagnosis),
         stages=course_charts.stages_of(diagnosis),
-        told=network_chart.marks(diagnosis).told(network_chart.corrected(diagnosis)),
+        told=network_chart.marks(diagnosis).told,
         fits=[(title, _rows(fits, diagnosis.faulty), fits.recordings if len(fits.recordings) > 1 else {})
               for title, fits in (("Held out", diagnosis.holdout), ("Learned from", diagnosis.train))],
         learnt=sorted((term.strength for term in diagnosis.learnt), key=lambda size: -size.start)[:MOST_LEARNT],

@@ -396,7 +396,7 @@ def test_a_large_network_keeps_rows_that_a_phone_has_room_for() -> None:
     places = places_of(network, network)
     assert sorted(places) == sorted(network.node_names) and len(set(places.values())) == len(places)
     assert max(Counter(row for _, row in places.values()).values()) <= WIDEST_ROW
-    names = drawing.drawn(network, network, (), drawing.Marks()).layout.annotations
+    names = drawing.drawn(drawing.Marks(network=network), network, ()).layout.annotations
     assert len(names) == len(network.nodes)
 
 
