@@ -54,9 +54,10 @@ def read_cycle_or_recording(
         With all problems of the file; or if a recording has gaps, with the pieces between them.
     """
     needed = {STANDARD, *(given.column for given in network.inputs.values() if given.required)}
-    because = GIVEN if mapping is not None else _what_makes_a_recording(text, needed, network)
+    names = column_names(text)
+    because = GIVEN if mapping is not None else _what_makes_a_recording(text, set(names), needed, network)
     if not because:
-        return *read_cycle_and_start(text, network.inputs), tuple(_unused(column_names(text), network))
+        return *read_cycle_and_start(text, network.inputs), tuple(_unused(names, network))
     try:
         recording = read_recording(text, network, mapping=mapping, to_compare=False)
     except InputError as error:
@@ -77,7 +78,7 @@ def read_cycle_or_recording(
     return cycle, start, (*recording.notes, *_clock_notes(recording))
 
 
-def _what_makes_a_recording(text: Path, needed: Set[str], network: RecordedMachine) -> str:
+def _what_makes_a_recording(text: Path, names: Set[str], needed: Set[str], network: RecordedMachine) -> str:
     """Why a file must be read as a recording; empty for a plain cycle.
 
     So are parts, joined files and formats other than tables; files with a column that a mapping names; and files that
@@ -85,12 +86,12 @@ def _what_makes_a_recording(text: Path, needed: Set[str], network: RecordedMachi
     """
     if not text.name.lower().endswith(KINDS) or len(split_path(text)[0]) > 1:
         return GIVEN
-    names, own = set(column_names(text)), mapping_beside(text)
+    own = mapping_beside(text)
     if own is not None:
         # The mapping may be there for other files of the folder.
         as_it_reads = column_names(text, own.text_form)
         is_meant = not (_named(own) or needed).isdisjoint(as_it_reads)
-        return "a mapping next to it" if is_meant or not names.issuperset(needed) else ""
+        return "a mapping next to it" if is_meant or not names >= needed else ""
     if not names:  # the reader of plain cycles reports why
         return ""
     lacking = [quantity for quantity in quantities_of(network).values() if quantity.column not in names]
