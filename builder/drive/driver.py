@@ -147,6 +147,8 @@ class LoadedFmu:
         self._input_references = [v.valueReference for v in self._inputs]
         self._orders = [1] * len(self._inputs)
         self._to_si = [to_column_factors(v) for v in self._inputs]
+        self._nodes, self._starts = temperature_variables(variables), start_variables(variables)
+        self._memories = memory_variables(variables)
 
     def defaults(self) -> list[float]:
         """Start values of the inputs in the units of file columns."""
@@ -192,24 +194,19 @@ class LoadedFmu:
 
     def set_initial(self, initial: float | Mapping[str, float]) -> None:
         """Set start values: one temperature for all nodes, or all parts by name, and memories; [degC]."""
-        variables = self.description.modelVariables
-        starts, nodes = start_variables(variables), temperature_variables(variables)
-        temperatures = start_temperatures(initial, list(starts), known=nodes, source=str(self.path))
+        temperatures = start_temperatures(initial, list(self._starts), known=self._nodes, source=str(self.path))
         self.slave.setBoolean([self.variables["initial.uniform"].valueReference], [not isinstance(initial, Mapping)])
         if not isinstance(initial, Mapping):
             self._set_real(self.variables["initial.T"], initial)
             return
-        for name, variable in starts.items():
+        for name, variable in self._starts.items():
             self._set_real(variable, temperatures[name])
-        memories = memory_variables(variables)
-        values = start_memories(initial, {name: float(v.start) for name, v in memories.items()})
-        self.slave.setReal([memories[name].valueReference for name in values], list(values.values()))
+        values = start_memories(initial, {name: float(v.start) for name, v in self._memories.items()})
+        self.slave.setReal([self._memories[name].valueReference for name in values], list(values.values()))
 
     def surroundings(self) -> float:
         """Return the ambient temperature, else that of the first boundary, at the inputs that are set, [degC]."""
-        variables = self.description.modelVariables
-        starts = start_variables(variables)
-        boundaries = (v for node, v in temperature_variables(variables).items() if node not in starts)
+        boundaries = (v for node, v in self._nodes.items() if node not in self._starts)
         variable = self.variables.get("T_ambient") or next(boundaries)
         return float(to_column(variable, self.slave.getReal([variable.valueReference])[0]))
 
