@@ -67,11 +67,7 @@ def unit(symbol: str) -> str:
     >>> unit("degC"), unit("mm^2/s"), unit("1")
     ('°C', 'mm²/s', '')
     """
-    head, *powers = UNITS.get(symbol, symbol).split("^")
-    for power in powers:
-        digits = len(power) - len(power.lstrip("-0123456789"))
-        head += power[:digits].translate(SUPERSCRIPTS) + power[digits:]
-    return head
+    return re.sub(r"\^([-\d]*)", lambda power: power[1].translate(SUPERSCRIPTS), UNITS.get(symbol, symbol))
 
 
 def name(identifier: str) -> str:
