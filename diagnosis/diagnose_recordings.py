@@ -138,7 +138,7 @@ def diagnose(
         progress("predicting the recordings free-running")
         return assemble(
             setup, experiment, posterior, decide(posterior),
-            plain=calibrated_to_predict(plain if rest is None else others, calibration.fit, start),
+            plain=calibrated_to_predict(plain if rest is None else others, calibration.fit),
             calibration=calibration,
             others=None if rest is None else Others(posterior=rest, channels=faulty, apart=tuple(apart)),
         )  # fmt: skip

@@ -1,72 +1,117 @@
-"""Machines calibrated by noise alone, without model error: what predicts, and what an FMU holds."""
+"""Machines calibrated to predict, without model error and without random heat: what predicts, and what an FMU holds.
+
+Random heat lets a course drift off, so that where the model lacks much, parameters go far to follow what comes and goes
+within minutes while the level is missed by kelvins. Here courses are judged by how far they are from the readings: an
+hour counts as one reading of a thermometer, off by an error that is estimated with the parameters.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import chain
 
 import numpy as np
 
-from diagnosis.engine.fit import NO_SOLUTION, NOISE_ALONE, Experiment, Fit, Guess, calibrate
-from diagnosis.engine.mean_loss import is_estimated, mean_loss, mean_loss_slopes
+from diagnosis.engine.fit import NO_SOLUTION, NOISE_ALONE, Experiment, Fit, Guess
+from diagnosis.engine.mean_loss import mean_loss, mean_loss_slopes
+from diagnosis.engine.predict import overall_rmse, predict
 from diagnosis.engine.scale import all_sizes_are_unknown, is_of_temperatures
 from diagnosis.engine.set_apart import without_channels
 from diagnosis.engine.unknown import Held, NetworkParameter, SensorBias, SensorLag, TermParameter, Unknown
-from diagnosis.forward.whitening import AS_ASSUMED, RandomHeat
+from diagnosis.forward.whitening import AS_ASSUMED, Noise, RandomHeat
 from models.base.types import Array
 from models.quantities.quantities import is_total_loss
 from models.terms.term import Term
 
-QUIET = RandomHeat(heat=0.1, wander=0.1)  # times the random heat that is assumed
-# By which temperatures have to come nearer before parameters may stand in for what the model lacks: with less random
-# heat; with free losses as well, by what thermometers are usually off.
-NEARER_K, LOSSES_K = 0.1, 0.3
-FAR_OFF = 2.0  # times the least error of the temperatures, beyond which a fit predicts too badly to be chosen
-MOST_LOSS = 1.5  # times the mean loss that was estimated, or as much less, beyond which a model is worse for it
+NO_RANDOM_HEAT = RandomHeat(heat=0.0, wander=0.0)
+READING_S = 3600.0  # over which errors of a course belong together; 0.7 to 1.3 h on six machines
+LOSS_SHARE = 0.05  # of a measured loss, by which it may be off in an hour
+FIRST_K, MOST_TURNS, SETTLED = 0.1, 8, 0.97  # error of the first turn; of the one before, from which it has settled
+NEARER_K = 0.3  # by which temperatures come nearer before losses leave their estimates: what thermometers are off by
+NEARER_SHARE = 0.2  # of the error that goes away before numbers of a finding leave theirs
 LEAST_SHARE = 1e-6  # of the mean loss that an unknown changes per prior standard deviation
 
 
-@dataclass(frozen=True, kw_only=True)
-class Calibrations:
-    """Calibrations of one machine with the same unknowns free, from several starts; those without a solution left out.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Levelled:
+    """A machine calibrated by the level of its temperatures.
 
     Attributes
     ----------
-    usual, quiet : tuple of Fit
-        With random heat as assumed, and with less
+    off_K : float
+        Root mean square by which its free-running predictions miss the thermometers, [K]
+    held : list of int
+        Places of the unknowns that stayed
     """
 
-    usual: tuple[Fit, ...]
-    quiet: tuple[Fit, ...]
+    fit: Fit
+    off_K: float
+    held: list[int]
+
+    def among(self, free: Experiment) -> Fit:
+        """The fit with random heat as assumed."""
+        return free.fit(self.fit.z, self.fit.trajectories, iterations=0)
 
 
-def calibrated_to_predict(plain: Fit, with_error: Fit, start: Array | None = None) -> Fit:
-    """The nominal machine calibrated by noise alone: the best of several calibrations.
+def calibrated_to_predict(plain: Fit, with_error: Fit) -> Fit:
+    """The nominal machine calibrated to predict.
 
     Parameters
     ----------
     plain : Fit
-        A first calibration, with random heat as assumed
+        A first calibration
     with_error : Fit
-        The same machine calibrated with model error: another start, the instruments, and the size of its losses
-    start : Array, shape (unknowns,), or None
-        Where the first calibration began; by default at the middles of the priors
+        The same machine calibrated with model error: another start, and the estimates of instruments and losses
 
     Returns
     -------
     Fit
-        The first calibration if none of the others has a solution
+        The first calibration if there is no other solution
     """
-    free, estimated = replace(plain.experiment, filters=None), _estimated(with_error)
-    first = np.zeros(len(plain.z)) if start is None else start
-    tried = _calibrations(free, with_error.z, estimated, [with_error.z], [first])
-    if not estimated[-1]:
-        tried = [replace(one, usual=(plain, *one.usual)) for one in tried]
+    free = replace(plain.experiment, filters=None)
+    starts = [(with_error.z, with_error.trajectories), (plain.z, plain.trajectories)]
     with suppress(ArithmeticError):
-        return _best_of(free, tried, with_error)
+        return _nearest(free, with_error.z, _estimated(with_error), starts).among(free)
     return plain
+
+
+def refit_to_predict(fit: Fit, plain: Fit, apart: Collection[str] = ()) -> Fit:
+    """An explanation calibrated to predict, with the numbers of its finding as estimated unless others are far nearer.
+
+    Parameters
+    ----------
+    fit : Fit
+        With model error in its metric, and with random heats that go with it
+    plain : Fit
+        The nominal machine calibrated to predict: a second start of the search, because there may be several basins
+    apart : collection of str
+        Channels that do not count; what describes their sensors stays as it is
+
+    Raises
+    ------
+    ArithmeticError
+        If there is no solution.
+    """
+    every = replace(
+        fit.experiment, noise=plain.experiment.noise, random_heat=AS_ASSUMED, filters=None, metric=NOISE_ALONE
+    )
+    counting = without_channels(every, apart) if apart else every
+    nominal = fit.z.copy()
+    nominal[: len(plain.z)] = plain.z_in(every)
+    terms = {term.label: term for term in every.machine.terms}
+    own = [index for index, unknown in enumerate(every.unknowns) if _describes(unknown, terms, apart)]
+    nominal[own] = fit.z[own]
+    estimate = nominal if apart else fit.z  # a broken sensor has bent what was estimated of the others
+    held = [[*own, *held] for held in _estimated(fit)]
+    starts = [(fit.z, fit.trajectories), (nominal, fit.trajectories)]
+    found = _nearest(counting, estimate, held, starts)
+    with suppress(ArithmeticError):
+        numbers = range(len(plain.z), len(fit.z))
+        kept = _nearest(counting, estimate, [[*found.held, *numbers]], starts[:1])
+        if found.off_K > (1.0 - NEARER_SHARE) * kept.off_K:
+            found = kept
+    return found.among(every)
 
 
 def _estimated(with_error: Fit) -> list[list[int]]:
@@ -87,28 +132,6 @@ def _estimated(with_error: Fit) -> list[list[int]]:
         return [[]]
     instruments = instruments_of(known)
     return [*([[*instruments, *_losses(with_error)]] if is_of_temperatures(known) else []), instruments]
-
-
-def _calibrations(
-    free: Experiment, estimate: Array, held_in_turn: Sequence[Sequence[int]], starts: Sequence[Array],
-    quiet_starts: Sequence[Array], guesses: Sequence[Guess] | None = None,
-) -> list[Calibrations]:  # fmt: skip
-    """Calibrations by noise alone from several starts, with some unknowns at an estimate."""
-    quiet = free.with_random_heat(QUIET)
-
-    def calibrated(experiment: Experiment, start: Array, held: Sequence[int]) -> Iterator[Fit]:
-        z = start.copy()
-        z[held] = estimate[held]
-        with suppress(*NO_SOLUTION):
-            yield calibrate(experiment, z, guesses, held)
-
-    return [
-        Calibrations(
-            usual=tuple(fit for start in starts for fit in calibrated(free, start, held)),
-            quiet=tuple(fit for start in quiet_starts for fit in calibrated(quiet, start, held)),
-        )
-        for held in held_in_turn
-    ]
 
 
 def _losses(fit: Fit) -> list[int]:
@@ -136,85 +159,82 @@ def instruments_of(experiment: Experiment, findings: Collection[str] = ()) -> li
     ]  # fmt: skip
 
 
-def _best_of(free: Experiment, tried: Iterable[Calibrations], estimated: Fit) -> Fit:
-    """The most probable of some calibrations that predict well, judged by the noise that is assumed.
-
-    Those count that come as near to the temperatures as the best ones of all, but for :data:`LOSSES_K`, the first such
-    ones; and of these those with less random heat only where they are nearer by :data:`NEARER_K`. Random heat lets a
-    course drift off, so that where the model lacks much, a fit which misses the temperatures by kelvins may be the most
-    probable one. With less random heat the courses stay near, but parameters stand in for what the model lacks. Where
-    the mean loss is estimated, a fit that is farther from it than :data:`MOST_LOSS` has its error multiplied by the
-    excess.
-    """
-    loss = mean_loss(estimated) if is_estimated(estimated.experiment) else None
-    settled = [(_settled(one.usual, loss), _settled(one.quiet, loss)) for one in tried]
-    nearest = min((off_K for pair in settled for off_K, _ in chain(*pair)), default=np.inf)
-    for usual, quiet in settled:
-        near = min((off_K for off_K, _ in (*usual, *quiet)), default=np.inf)
-        if near <= nearest + LOSSES_K and np.isfinite(near):
-            chosen = usual if any(off_K <= near + NEARER_K for off_K, _ in usual) else quiet
-            farthest = FAR_OFF * min(off_K for off_K, _ in chosen)
-            best = max((one for off_K, one in chosen if off_K <= farthest), key=lambda one: one.log_evidence)
-            if best.experiment.random_heat == AS_ASSUMED:
-                return best
-            return free.fit(best.z, best.trajectories, iterations=0)
-    raise ArithmeticError("the simulation has no solution without model error")
-
-
-def _settled(fits: Iterable[Fit], loss: float | None) -> list[tuple[float, Fit]]:
-    """Fits linearised once more, with their errors [K]: a course that has not settled may look better than it is.
-
-    With an estimated mean loss [W], an error is multiplied by the excess of the fit's own over :data:`MOST_LOSS`.
-    """
-    found = []
-    for one in fits:
-        with suppress(*NO_SOLUTION):
-            again = replace(one.experiment, filters=None).fit(one.z, iterations=0)
-            off_K = _off_by(again)
-            if loss:
-                own = mean_loss(again)
-                off_K *= max(own / loss, loss / own, MOST_LOSS) / MOST_LOSS
-            found.append((off_K, again))
-    return found
-
-
-def _off_by(fit: Fit) -> float:
-    """Root mean square by which the course misses the temperatures that count, [K]."""
-    thermometers = [not is_total_loss(name) for name in fit.experiment.pieces[0].channels]
-    return float(np.sqrt(np.nanmean(np.square(np.concatenate([p.point.residual[:, thermometers] for p in fit.parts])))))
-
-
-def refit_to_predict(fit: Fit, plain: Fit, apart: Collection[str] = ()) -> Fit:
-    """An explanation calibrated as the nominal machine is, by noise alone: what predicts, and what an FMU holds.
-
-    Parameters
-    ----------
-    fit : Fit
-        With model error in its metric, and with random heats that go with it
-    plain : Fit
-        The nominal machine so calibrated: a second start of the search, because there may be several basins
-    apart : collection of str
-        Channels that do not count; what describes their sensors stays as it is
+def _nearest(
+    free: Experiment, estimate: Array, held_in_turn: Sequence[list[int]],
+    starts: Sequence[tuple[Array, Sequence[Guess]]],
+) -> Levelled:  # fmt: skip
+    """The calibration with most unknowns at an estimate that comes as near as the nearest, but for :data:`NEARER_K`.
 
     Raises
     ------
     ArithmeticError
         If there is no solution.
     """
-    every = replace(
-        fit.experiment, noise=plain.experiment.noise, random_heat=AS_ASSUMED, filters=None, metric=NOISE_ALONE
-    )
-    counting = without_channels(every, apart) if apart else every
-    nominal = fit.z.copy()
-    nominal[: len(plain.z)] = plain.z_in(every)
-    terms = {term.label: term for term in every.machine.terms}
-    own = [index for index, unknown in enumerate(every.unknowns) if _describes(unknown, terms, apart)]
-    nominal[own] = fit.z[own]
-    found = _best_of(counting, _calibrations(
-        counting, nominal if apart else fit.z,  # a broken sensor has bent what was estimated of the others
-        [[*own, *held] for held in _estimated(fit)], [fit.z, nominal], [fit.z, nominal], fit.trajectories,
-    ), fit)  # fmt: skip
-    return every.fit(found.z, found.trajectories, iterations=0) if apart else found
+    found = []
+    for held in held_in_turn:
+        reached = [one for start, guesses in starts for one in _levelled(free, start, guesses, estimate, held)]
+        found += [min(reached, key=lambda one: one.off_K)] if reached else []
+    nearest = min((one.off_K for one in found), default=np.inf)
+    for one in found:
+        if one.off_K <= nearest + NEARER_K:
+            return one
+    raise ArithmeticError("the simulation has no solution without model error")
+
+
+def _levelled(
+    free: Experiment, start: Array, guesses: Sequence[Guess], estimate: Array, held: list[int]
+) -> Iterator[Levelled]:
+    """A calibration and its error, which settle in turn; nothing where there is no solution."""
+    z, off_K = start.copy(), FIRST_K
+    z[held] = estimate[held]
+    with suppress(*NO_SOLUTION):
+        for _ in range(MOST_TURNS):
+            before, fit = off_K, _by_level(free, off_K).fit(z, guesses, held=held)
+            off_K = before * _missed(fit)
+            if SETTLED * before < off_K < before / SETTLED:
+                break
+            z, guesses = fit.z, fit.trajectories
+        yield Levelled(fit=fit, off_K=_missed_when_running_free(free, fit), held=held)
+
+
+def _by_level(free: Experiment, off_K: float) -> Experiment:
+    """Experiment without random heat in which an hour counts as one reading of every channel, off by `off_K`."""
+
+    def noise(index: int) -> Noise:
+        piece, known = free.pieces[index], free.noise[index]
+        seen = np.isfinite(piece.measured)
+        rows = np.where(seen, piece.counts, 0.0).sum(axis=0)
+        level = np.abs(np.nansum(piece.measured, axis=0)) / np.maximum(seen.sum(axis=0), 1)
+        off = np.where([is_total_loss(name) for name in piece.channels], LOSS_SHARE * level, off_K)
+        as_one = np.sqrt(np.maximum(rows, 1.0) / _readings(free, index))
+        return replace(known.with_random_heat(NO_RANDOM_HEAT), channel_sd=np.maximum(known.channel_sd, off * as_one))
+
+    noises = tuple(noise(index) for index in range(len(free.pieces)))
+    return replace(free, noise=noises, random_heat=NO_RANDOM_HEAT, filters=None)
+
+
+def _readings(experiment: Experiment, index: int) -> float:
+    return max(float(experiment.pieces[index].steps.sum()) / READING_S, 1.0)
+
+
+def _missed_when_running_free(free: Experiment, fit: Fit) -> float:
+    """Root mean square error of the thermometers, with switches by their own course, [K]."""
+    thermometers = [i for i, name in enumerate(free.pieces[0].channels) if not is_total_loss(name)]
+    there = replace(fit.experiment, noise=free.noise)
+    runs = [predict(there, index, fit.z, guess=course.T) for index, course in enumerate(fit.trajectories)]
+    return overall_rmse(runs, thermometers)
+
+
+def _missed(fit: Fit) -> float:
+    """Root mean square of the errors of the thermometers, to those that are assumed, start temperatures fitted."""
+    squares = readings = 0.0
+    for index, part in enumerate(fit.parts):
+        piece = fit.experiment.pieces[index]
+        thermometers = [not is_total_loss(name) for name in piece.channels]
+        seen = np.logical_and(np.isfinite(piece.measured).any(axis=0), thermometers)
+        squares += float(np.square(part.residual.reshape(piece.measured.shape)[:, seen]).sum())
+        readings += _readings(fit.experiment, index) * float(seen.sum())
+    return float(np.sqrt(squares / readings))
 
 
 def _describes(unknown: Unknown, terms: Mapping[str, Term], channels: Collection[str]) -> bool:

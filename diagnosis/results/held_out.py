@@ -121,8 +121,11 @@ def _switches_for_nothing(best: Judged, holdout: Fits) -> bool:
 
 
 def _best(posterior: Posterior, answers: Sequence[Answer]) -> Judged | None:
-    """The explanation that predicts: of the answers, else the most probable one, which needs no name for that."""
-    if answers:
+    """The explanation that predicts: of the answers, else the most probable one, which needs no name for that.
+
+    A heat that is like no law is never fitted and predicts nothing: the most probable law does so in its place.
+    """
+    if answers and answers[0].best.fit is not None:
         return answers[0].best
     fitted = (one for one, _ in posterior.ranked if one.fit is not None and one.kind != "nothing")
     return next(fitted, None) if posterior.detected else None

@@ -114,7 +114,7 @@ def test_a_fit_without_error_keeps_the_values_of_faulty_sensors_and_has_the_assu
     found = refit_to_predict(given, fit, apart)
     assert found.z[at] == 9.0
     assert found.experiment.noise == experiment.noise and found.experiment.random_heat == AS_ASSUMED
-    assert np.delete(found.z, at) == pytest.approx(np.delete(calibrated_to_predict(fit, fit, z).z, at), abs=0.3)
+    assert np.delete(found.z, at) == pytest.approx(np.delete(calibrated_to_predict(fit, fit).z, at), abs=0.3)
     monkeypatch.setattr(to_predict, "all_sizes_are_unknown", lambda *_: False)  # where instruments stay
     found = refit_to_predict(given, fit, apart)
     assert found.z[at] == 9.0 and found.z[bent] == fit.z_in(given.experiment)[bent]

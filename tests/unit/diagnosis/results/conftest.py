@@ -17,6 +17,7 @@ from diagnosis.engine.learnt import error_classes
 from diagnosis.engine.model_error import ModelError
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.refit import refit
+from diagnosis.engine.to_predict import calibrated_to_predict
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.assemble import assemble
 from diagnosis.results.result import Diagnosis
@@ -64,10 +65,11 @@ def calibration(prepared: Prepared) -> Calibration:
 @pytest.fixture(scope="session")
 def assembled(prepared: Prepared, calibration: Calibration) -> Assemble:
     setup, experiment, plain = prepared
+    predicting = calibrated_to_predict(plain, plain)
 
     def result(posterior: Posterior, answers: list[Answer], **given: Any) -> Diagnosis:
         return assemble(
-            setup, given.pop("experiment", experiment), posterior, answers, plain=plain,
+            setup, given.pop("experiment", experiment), posterior, answers, plain=predicting,
             calibration=calibration, **given,
         )  # fmt: skip
 

@@ -18,6 +18,7 @@ from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.learnt import error_classes, rule
 from diagnosis.engine.outside import outside_of
 from diagnosis.engine.refit import with_candidate
+from diagnosis.engine.to_predict import calibrated_to_predict
 from diagnosis.engine.unknown import NetworkParameter
 from diagnosis.forward.whitening import RandomHeat
 from diagnosis.proof.scoring.answers import read_answer
@@ -73,8 +74,8 @@ def test_a_claim(claimed: Diagnosis, fzg: Gearbox) -> None:
     assert "speed above" in first.regime and first.when[0][0] == RECORDED
     assert second.heat_max_W == 0.0  # nothing was fitted there
     # Free-running: the nominal model lacks heat, tuning swallows some of it, and what is left then is noise.
-    for fits in (claimed.train, claimed.holdout):
-        assert fits.before > fits.calibrated > 1.3 * fits.after
+    for fits, times in ((claimed.train, 1.1), (claimed.holdout, 1.3)):
+        assert fits.before > fits.calibrated > times * fits.after
     assert claimed.holdout.after < 2.0 * NOISE_K
     assert claimed.holdout_gain > 20.0
     assert [(c.recording, c.held_out) for c in claimed.courses] == [(RECORDED, False), ("judged", True)]
@@ -231,7 +232,7 @@ def test_a_link_that_changes_at_a_date_acts_like(
     own = replace(experiment, starts_at=starts)
     effect = next(one for one in candidates_of(setup, own) if one.label == "radiation_for_a_while@housing_air")
     assert effect.term is not None and effect.clock is not None
-    values = {"strength": -0.4, "since": starts_at + DATE_S, "lasting": 1800.0, "start": 0.0}
+    values = {"strength": -0.02, "since": starts_at + DATE_S, "lasting": 1800.0, "start": 0.0}
     variant = np.array([[values[p.name.removeprefix(f"{effect.term.label}_")] for p in effect.term.parameters]])
     effect = replace(effect, variants=variant, log_prior=-5.0)
     changed, z = with_candidate(replace(plain, experiment=replace(plain.experiment, starts_at=starts)), effect, 0)
@@ -357,9 +358,10 @@ def assembled_alike(prepared: Prepared, calibration: Calibration) -> Assemble:
     """Held out is what was learnt: other readings would contradict what is invented here."""
     setup, experiment, plain = prepared
     alike = replace(setup, holdout=setup.recordings, held_out=setup.learnt)
+    predicting = calibrated_to_predict(plain, plain)
 
     def result(posterior: Posterior, answers: list[Answer]) -> Diagnosis:
-        return assemble(alike, experiment, posterior, answers, plain=plain, calibration=calibration)
+        return assemble(alike, experiment, posterior, answers, plain=predicting, calibration=calibration)
 
     return result
 
@@ -403,16 +405,16 @@ def test_a_sensor_fault(assembled_alike: Assemble, prepared: Prepared, windage: 
     (setup, _, plain), assembled = prepared, assembled_alike
     effect = replace(effect_of(setup, plain, "sensor_bias", "oil"), log_prior=-3.0)
     assert effect.term is not None
-    fit = _fit_with(plain, effect, {effect.term.strength.name: 0.2})
+    fit = _fit_with(plain, effect, {effect.term.strength.name: 0.02})
     judged = Judged(effects=(effect,), log_bayes=70.0, fit=fit, error_class=error_classes()[0])
     claim = Answer(best=judged, effect=effect, grade="claim", probability=0.98, joint=0.98)
     found = assembled(posterior_of(plain, judged), [claim])
     (finding,) = found.findings
     assert (found.verdict, finding.kind, finding.node, finding.heat_mean_W) == ("sensor_fault", "sensor", "oil", 0.0)
     calibrated = {u.parameter.name: u.value(z) for u, z in zip(fit.experiment.unknowns, fit.z.tolist(), strict=True)}
-    assert finding.parameters[0].value == pytest.approx(0.2 + calibrated["bias_oil"])
+    assert finding.parameters[0].value == pytest.approx(0.02 + calibrated["bias_oil"])
     (term,) = found.terms
-    assert term.parameters[0].start == pytest.approx(0.2)  # as estimated
+    assert term.parameters[0].start == pytest.approx(0.02)  # as estimated
     assert "in the measurement" in str(found)
     assert read_answer(found.to_dict(), fzg).claims[0].what == "sensor"
     tied = Answer(best=judged, effect=effect, grade="likely", probability=0.75, joint=0.97,
@@ -441,7 +443,8 @@ def test_the_calibrated_machine_alone_is_a_correction_too(
 ) -> None:
     """Where the findings do not improve the prediction it is the one to predict with."""
     write_correction(correction_of(claimed.calibrated_alone, fzg), tmp_path / "calibrated.toml")
-    read, known = read_correction(tmp_path / "calibrated.toml", fzg), estimates_of(prepared[2])
+    predicting = calibrated_to_predict(prepared[2], prepared[2])
+    read, known = read_correction(tmp_path / "calibrated.toml", fzg), estimates_of(predicting)
     assert not [f for f in read.findings if f.mechanism != "shape"]
     for one in read.calibration:
         assert (one.value, one.stderr) == pytest.approx(known[one.name], rel=1e-6)

@@ -59,3 +59,18 @@ def test_a_warm_machine_is_as_measured(model: NetworkOnGrid, piece: Piece) -> No
     covariance = start_covariance(model, one)
     np.testing.assert_array_equal(covariance, np.diag(np.diag(covariance)))
     assert np.sqrt(np.diag(covariance)).min() == pytest.approx(2.0)
+
+
+def test_a_part_without_a_reading_is_between_its_neighbours(model: NetworkOnGrid, piece: Piece) -> None:
+    """By its conductances: all warm parts and cold air give something between, a part that only hangs on the air that
+    of the air."""
+    measured = np.full_like(piece.measured, np.nan)
+    measured[0, :3] = 60.0, 60.0, 60.0
+    guess = start_guess(model, replace(piece, measured=measured))
+    ambient = piece.inputs[0, model.laws.inputs.index("T_ambient")]
+    seen = {model.part_index(name) for name in CHANNELS[:3]}
+    others = [guess[i] for i in range(model.n) if i not in seen]
+    assert all(ambient < T <= 60.0 + 1e-6 for T in others)
+    gears = guess[model.parts.index("wheel")]  # in the oil, far from the air
+    upper = guess[model.parts.index("housing_upper")]  # gives heat to the air
+    assert upper < gears - 0.5
