@@ -310,10 +310,10 @@ def _how_much_better(d: Diagnosis) -> tuple[str, ...]:
     ]
     lines += _worse_recordings(d)
     named_terms = {finding.term.label for finding in d.findings if finding.term is not None}
-    further = len([term for term in d.terms if term.label not in named_terms])
+    further = [term.label.replace("__", " ").replace("_", " ") for term in d.terms if term.label not in named_terms]
     if d.findings and further:
         lines.append(
-            f"The correction also holds {further} effect{'s' * (further > 1)} without a certain name (grade learnt)"
+            f"The correction also holds what predicts best, without a certain name (grade learnt): {', '.join(further)}"
         )
     scored = d.has_correction and math.isfinite(d.holdout_gain) and d.holdout_gain != 0.0  # 0: nothing was fitted
     withdrawn = d.contradicted and d.holdout.found > d.holdout.calibrated

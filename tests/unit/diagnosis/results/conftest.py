@@ -69,7 +69,8 @@ def assembled(prepared: Prepared, calibration: Calibration) -> Assemble:
 
     def result(posterior: Posterior, answers: list[Answer], **given: Any) -> Diagnosis:
         return assemble(
-            setup, given.pop("experiment", experiment), posterior, answers, plain=predicting,
+            setup, given.pop("experiment", experiment), posterior, answers,
+            plain=given.pop("plain", predicting),
             calibration=calibration, **given,
         )  # fmt: skip
 

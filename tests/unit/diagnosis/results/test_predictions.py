@@ -35,7 +35,8 @@ def test_what_was_learnt_of_model_error_is_in_prediction_and_correction(
     """The full model with the correction, read through its sensors, gives the prediction that was judged."""
     splits = next(one for one in error_classes() if one.name == "splits and law errors")
     posterior = posterior_of(calibration.near.fitted(splits, prepared[2]).fit, log_e=-1.0)
-    found = assembled(replace(posterior, nothing=replace(posterior.nothing, error_class=splits)), [])
+    missing = replace(posterior, nothing=replace(posterior.nothing, error_class=splits))
+    found = assembled(missing, [], plain=prepared[2])
     assert found.verdict in ("consistent", "insufficient_data") and found.learnt and found.has_correction
     assert found.holdout.found == found.holdout.calibrated > found.holdout.after
     correction = correction_of(found, fzg)
@@ -73,7 +74,8 @@ def test_what_was_learnt_is_left_out_where_it_makes_the_recordings_worse(
         return replace(fit, experiment=replace(fit.experiment, machine=Machine(model, there.terms, there.mixes))), terms
 
     monkeypatch.setattr(predictions, "with_learnt_error", wrong)
-    found = assembled(replace(posterior, nothing=replace(posterior.nothing, error_class=splits)), [])
+    missing = replace(posterior, nothing=replace(posterior.nothing, error_class=splits))
+    found = assembled(missing, [], plain=prepared[2])
     assert not found.learnt and not found.has_correction
     assert found.holdout.after == found.holdout.calibrated
     assert (found.left_out_K > found.holdout.after + 1.0) is callable(law)
