@@ -25,7 +25,7 @@ from models.quantities.quantities import is_total_loss
 from models.terms.term import Term
 
 NO_RANDOM_HEAT = RandomHeat(heat=0.0, wander=0.0)
-READING_S = 3600.0  # over which errors of a course belong together; 0.7 to 1.3 h on two, with two definitions each
+READING_S = 3600.0  # over which errors of a course belong together; 0.7 to 1.3 h on two machines
 LOSS_SHARE = 0.05  # of a measured loss, by which it may be off in an hour
 FIRST_K, MOST_TURNS, SETTLED = 0.1, 8, 0.97  # error of the first turn; of the one before, from which it has settled
 NEARER_K = 0.3  # by which temperatures come nearer before losses leave their estimates: what thermometers are off by
