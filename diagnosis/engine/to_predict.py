@@ -49,9 +49,9 @@ class Levelled:
     off_K: float
     held: list[int]
 
-    def among(self, free: Experiment) -> Fit:
-        """The fit with random heat as assumed."""
-        return free.fit(self.fit.z, self.fit.trajectories, iterations=0)
+    def judged_in(self, experiment: Experiment) -> Fit:
+        """The same values, judged by the noise of another experiment with the same recordings."""
+        return experiment.fit(self.fit.z, self.fit.trajectories, iterations=0)
 
 
 def calibrated_to_predict(plain: Fit, with_error: Fit) -> Fit:
@@ -72,7 +72,7 @@ def calibrated_to_predict(plain: Fit, with_error: Fit) -> Fit:
     free = replace(plain.experiment, filters=None)
     starts = [(with_error.z, with_error.trajectories), (plain.z, plain.trajectories)]
     with suppress(ArithmeticError):
-        return _nearest(free, with_error.z, _estimated(with_error), starts).among(free)
+        return _nearest(free, with_error.z, _estimated(with_error), starts).judged_in(free)
     return plain
 
 
@@ -111,7 +111,7 @@ def refit_to_predict(fit: Fit, plain: Fit, apart: Collection[str] = ()) -> Fit:
         kept = _nearest(counting, estimate, [[*found.held, *numbers]], starts[:1])
         if found.off_K > (1.0 - NEARER_SHARE) * kept.off_K:
             found = kept
-    return found.among(every)
+    return found.judged_in(every)
 
 
 def _estimated(with_error: Fit) -> list[list[int]]:
@@ -220,8 +220,7 @@ def _readings(experiment: Experiment, index: int) -> float:
 def _missed_when_running_free(free: Experiment, fit: Fit) -> float:
     """Root mean square error of the thermometers, with switches by their own course, [K]."""
     thermometers = [i for i, name in enumerate(free.pieces[0].channels) if not is_total_loss(name)]
-    there = replace(fit.experiment, noise=free.noise)
-    runs = [predict(there, index, fit.z, guess=course.T) for index, course in enumerate(fit.trajectories)]
+    runs = [predict(free, index, fit.z, guess=course.T) for index, course in enumerate(fit.trajectories)]
     return overall_rmse(runs, thermometers)
 
 

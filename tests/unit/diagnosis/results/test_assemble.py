@@ -272,6 +272,22 @@ def test_a_heat_like_no_law_has_no_numbers(assembled: Assemble, prepared: Prepar
     assert "like no law of the catalogue" in str(found) and "strength" not in str(found)
 
 
+def test_behind_a_heat_like_no_law_the_most_probable_law_predicts(
+    assembled: Assemble, prepared: Prepared, windage: Judged, fzg: Gearbox
+) -> None:
+    setup, experiment, plain = prepared
+    heat = next(one for one in outside_of(setup, experiment) if one.place == "oil")
+    judged = Judged(effects=(heat,), log_bayes=120.0, error_class=error_classes()[0])
+    answer = Answer(best=judged, effect=heat, grade="likely", probability=0.97, joint=0.97, acts_like=True)
+    found = assembled(posterior_of(plain, judged, windage), [answer])
+    assert (found.verdict, [one.place for one in found.findings]) == ("unexplained", ["oil"])
+    assert [term.label for term in found.terms] == ["windage_oil"]
+    assert found.holdout.after < 0.5 * found.holdout.calibrated
+    assert "what predicts best, without a certain name (grade learnt): windage oil" in str(found)
+    (learnt,) = (one for one in correction_of(found, fzg).findings if one.label == "windage_oil")
+    assert learnt.grade == "learnt"
+
+
 def test_the_band_of_a_date_ends_where_the_recordings_do(prepared: Prepared) -> None:
     setup, experiment, _ = prepared
     effect = next(one for one in candidates_of(setup, experiment) if one.name == "radiation_step")

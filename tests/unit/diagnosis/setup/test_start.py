@@ -62,8 +62,7 @@ def test_a_warm_machine_is_as_measured(model: NetworkOnGrid, piece: Piece) -> No
 
 
 def test_a_part_without_a_reading_is_between_its_neighbours(model: NetworkOnGrid, piece: Piece) -> None:
-    """By its conductances: all warm parts and cold air give something between, a part that only hangs on the air that
-    of the air."""
+    """By its conductances, and by the air."""
     measured = np.full_like(piece.measured, np.nan)
     measured[0, :3] = 60.0, 60.0, 60.0
     guess = start_guess(model, replace(piece, measured=measured))
