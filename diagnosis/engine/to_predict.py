@@ -50,7 +50,7 @@ class Levelled:
     held: list[int]
 
     def judged_in(self, experiment: Experiment) -> Fit:
-        """The same values, judged by the noise of another experiment with the same recordings."""
+        """Its values, judged by the noise of another experiment on these recordings."""
         return experiment.fit(self.fit.z, self.fit.trajectories, iterations=0)
 
 
