@@ -24,6 +24,13 @@ from models.simulation.thermal_network import Source, ThermalNetwork
 
 RUN_POWER = 8  # sharpness of the step of a conductance from standstill to running, over speed
 RATIOS = (0.02, 50.0)  # of speed, torque or viscosity, beyond which an exponent's deviation has no further effect
+# What mechanisms know the parts of a loss by, see models.mechanisms.places.
+ACTS_AS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
+    "gears": {"no_load": ("churning",), "load": ("mesh_sliding",)},
+    "bearings": dict.fromkeys(("no_load", "load"), ("factor bearing",)),
+    "seals": dict.fromkeys(("no_load", "load"), ("factor seal",)),
+    "other": dict.fromkeys(("no_load", "load"), ()),
+}
 SLOWEST_RPM = 1.0  # below it a torque from a power is that at it
 
 
@@ -163,6 +170,10 @@ class _Builder(TableBuilder[ParametricDefinition]):
         losses = [source for index, loss in enumerate(definition.loss) for source in self._sources(index, loss)]
         sources = (*losses, *self.heats())
         derived = {} if definition.torque is None else {"torque": self._torque(definition.torque)}
+        groups = self.groups()
+        gears = groups.get("gears", tuple(part.name for part in definition.part if part.name == "gears"))
+        if gears:  # a part that is gears and shafts
+            groups.setdefault("shafts", gears)
         return ThermalNetwork(
             nodes=nodes,
             links=links,
@@ -171,7 +182,7 @@ class _Builder(TableBuilder[ParametricDefinition]):
             components=ParametricLosses(definition).components,
             inputs=definition.inputs,
             derived=derived,
-            groups=self.groups(),
+            groups=groups,
             recording=definition.recording,
         )
 
@@ -211,7 +222,13 @@ class _Builder(TableBuilder[ParametricDefinition]):
             for of, ratio in tilts[kind]:
                 law *= self._tilt(f"{loss.name}_{of}_exponent", f"{path}.{of}_exponent", ratio)
             # The loss as assumed, times what a recording made of it; its name is the parameter's, so apart from it.
-            yield Source(name=name, node=loss.part, heat=symbol(f"P_{name}") * law, is_loss=True)
+            yield Source(name=name, node=loss.part, heat=symbol(f"P_{name}") * law, is_loss=True,
+                         acts_as=ACTS_AS[self._kind(loss)][kind])  # fmt: skip
+
+    def _kind(self, loss: Loss) -> str:
+        in_bearing = loss.part in self.groups().get("bearings", ())
+        named = "bearings" if in_bearing else "seals" if loss.name.startswith("seal") else "gears"
+        return loss.kind or named
 
     def _tilt(self, name: str, path: str, ratio: sp.Expr) -> sp.Expr:
         """``ratio ** deviation`` of an uncertain exponent."""

@@ -18,7 +18,7 @@ from models.network.laws import Parameter, symbol
 from models.simulation.thermal_network import Link, Node, Source, ThermalNetwork
 
 D = TypeVar("D", bound=MachineDefinition)
-GROUPS = ("housing", "bearings", "returns")
+GROUPS = ("housing", "bearings", "gears", "shafts", "returns")
 FARTHEST = 1000.0  # limits of a factor; its prior keeps it much nearer to 1
 
 

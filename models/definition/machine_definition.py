@@ -134,7 +134,7 @@ class Part(Section):
 
     name: Name
     heat_capacity_J_K: Annotated[float, between(1.0, 1e9)]
-    group: Literal["housing", "bearings", "returns"] | None = None
+    group: Literal["housing", "bearings", "gears", "shafts", "returns"] | None = None
 
 
 class Path(Section):

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, model_validator
 
@@ -66,10 +66,15 @@ class TorqueFromPower(Section):
 
 
 class Loss(Section):
-    """``[[loss]]``: heat in a part at the reference, without load and by the load, and how it goes with operation."""
+    """``[[loss]]``: heat in a part at the reference, without load and by the load, and how it goes with operation.
+
+    `kind` says what loses it. Unless stated, a loss in a part of the group of bearings is theirs, one whose name begins
+    with ``seal`` that of seals, and any other that of gears: churning without load, sliding by the load.
+    """
 
     name: Name
     part: Name
+    kind: Literal["gears", "bearings", "seals", "other"] | None = None
     no_load_W: Annotated[float, between(0.0, 1e7)]
     speed_exponent: Annotated[float, between(0.0, 5.0)] = 1.5
     viscosity_exponent: Annotated[float, between(-1.0, 2.0)] = 0.3

@@ -301,7 +301,7 @@ def _aliases(network: ThermalNetwork, scale: Scale) -> dict[str, sp.Expr]:
     }
     if "oil" in network.node_names:
         aliases["nu"] = scale.viscosity_at(symbol("T_oil")) / scale.viscosity
-    aliases |= {f"T_{group}": ABSENT for group in GROUPS}
+    aliases |= {f"T_{group}": ABSENT for group in GROUPS if group not in network.node_names}
     aliases |= {name: ABSENT for name in OPTIONAL if name not in network.signals}
     aliases |= {f"T_{group}": _mean(members) for group, members in network.groups.items()}
     return aliases

@@ -130,7 +130,7 @@ def _sources(network: ThermalNetwork, pattern: str) -> Iterator[Placement]:
         for source in network.sources
         if source.is_loss
         and any(
-            name in (source.name, STAGE_NUMBER.sub("", source.name), ALL_LOSSES)
+            name in (source.name, STAGE_NUMBER.sub("", source.name), ALL_LOSSES, *source.acts_as)
             or (name in network.groups and source.node in network.groups[name])
             or (name.startswith(FACTOR) and symbol(name.removeprefix(FACTOR)) in source.heat.free_symbols)
             for name in wanted

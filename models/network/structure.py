@@ -70,12 +70,21 @@ class Link:
 
 @dataclass(frozen=True, kw_only=True)
 class Source:
-    """A heat source in a node; `heat` in [W]. `is_loss`: the heat is mechanical power lost, and counts as such."""
+    """A heat source in a node; `heat` in [W].
+
+    Attributes
+    ----------
+    is_loss : bool
+        Whether the heat is mechanical power lost, and counts as such
+    acts_as : tuple of str
+        What a definition with geometry would call it, see :mod:`models.mechanisms.places`
+    """
 
     name: str
     node: str
     heat: sp.Expr
     is_loss: bool
+    acts_as: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
