@@ -28,6 +28,9 @@ LINEAR_S, SETTLING_S = 20.0 * HOUR_S, 3.0 * HOUR_S  # of the courses over the ho
 DATE_SD = 0.4  # of the time axis: nearly a uniform prior
 RISES, LENGTHS = (3.0,), (1.5, 4.0)  # of a slow step and of a change for a while, in distances between dates
 STEP, WHILE, HOURS, CARRIED_ON = "step", "for_a_while", "over_hours", "carried_on"  # endings of labels
+EACH_DAY, HOURS_OF_DAY = "each_day", 24.0
+NOON, LENGTH = "noon", "length"  # shapes of a law that comes again at one hour: when it is at its height, how long
+NOONS_H, LENGTHS_S = tuple(np.arange(0.0, HOURS_OF_DAY, 3.0)), (1.0 * HOUR_S, 2.5 * HOUR_S)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -44,12 +47,15 @@ class Axis:
         End of the last of all, held-out ones too, [s]; what grows is not known to go on after it
     edge_s : float
         Shortest time that a change takes, [s]
+    hour : float or None
+        Hour of the day (UTC) at which the axis begins; None: the recordings have no dates
     """
 
     dates: Array
     end: float
     until: float
     edge_s: float = 2.0 * EDGE_S
+    hour: float | None = None
 
     @property
     def distance(self) -> float:
@@ -260,6 +266,47 @@ def carried_on(placed: Placed, axis: Axis) -> Hypothesis:
     return replace(base, term=term, variants=variants, how="carried_on", ending=CARRIED_ON, clock=clock.name)
 
 
+def comes_daily(placed: Placed) -> bool:
+    """True if a law may come again every day at one hour."""
+    return any(p.name == f"{placed.label}_{NOON}" for p in placed.parameters)
+
+
+def each_day(placed: Placed, axis: Axis) -> Hypothesis:
+    """A law that comes again every day, with the hour of the day in place of the time since the start.
+
+    Parameters
+    ----------
+    placed : Placed
+        With the shapes `NOON` and `LENGTH`, and without memories
+    axis : Axis
+        With the hour of the day at which it begins
+    """
+    label = f"{placed.label}_{EACH_DAY}"
+    term, clock = _renamed(placed, label), axis.clock(label)
+    mechanism = placed.mechanism
+
+    def daily(law: sp.Expr, noon: sp.Symbol, start: sp.Symbol) -> sp.Expr:
+        now = (symbol("time") + start) / HOUR_S + axis.hour
+        away = sp.Mod(now - noon + HOURS_OF_DAY / 2.0, HOURS_OF_DAY) - HOURS_OF_DAY / 2.0
+        return law.xreplace({symbol("time"): HOUR_S * (noon + away), noon: HOUR_S * noon})
+
+    own = {
+        NOON: {"unit": "h", "start": HOURS_OF_DAY / 2.0, "sd": HOURS_OF_DAY / 3.0, "lower": -HOURS_OF_DAY,
+               "upper": 2.0 * HOURS_OF_DAY, "grid": NOONS_H, "description": "hour of the day (UTC) of the most of it"},
+        LENGTH: {"start": LENGTHS_S[-1], "lower": 0.2 * LENGTHS_S[0], "upper": 3.0 * LENGTHS_S[-1], "grid": LENGTHS_S},
+    }  # fmt: skip
+    parameters = tuple(replace(p, **own.get(p.name.removeprefix(f"{label}_"), {})) for p in term.parameters)
+    term = replace(
+        term, expression=daily(term.expression, symbol(f"{label}_{NOON}"), symbol(clock.name)), parameters=parameters,
+        written={key: daily(law, symbol(NOON), symbol(START)) for key, law in term.written.items()},
+        mechanism=replace(mechanism, says=f"Every day at one hour: {mechanism.says[:1].lower()}{mechanism.says[1:]}"),
+    )  # fmt: skip
+    base = hypothesis_of(term)
+    variants = np.column_stack([base.variants, np.full(len(base.variants), clock.start)])
+    return replace(base, term=replace(term, parameters=(*parameters, clock)), variants=variants, how="carried_on",
+                   ending=EACH_DAY, clock=clock.name)  # fmt: skip
+
+
 def _renamed(placed: Placed, label: str) -> Placed:
     """A law with another label, and so with names of parameters, states and boundary that differ from the law's."""
 
@@ -285,7 +332,11 @@ def _renamed(placed: Placed, label: str) -> Placed:
 
 def has_clock(placed: Placed) -> bool:
     """True if a law depends on the time, and on nothing that it remembers."""
-    return placed.form in (None, "shift") and not placed.states and symbol("time") in placed.expression.free_symbols
+    return (
+        placed.form in (None, "shift", "clock")
+        and not placed.states
+        and symbol("time") in placed.expression.free_symbols
+    )
 
 
 def may_change(placed: Placed) -> bool:

@@ -38,7 +38,7 @@ class Hypothesis:
         Values of the term's parameters that are tried, the strength 1
     how : str
         ``always``: as the law has it; ``from_date``: from a date on, or between two; ``carried_on``: a law of time that
-        goes on in the next recording; ``over_hours``: slowly; ``parameter``: one outside its prior
+        goes on in the next recording, or comes again every day; ``over_hours``: slowly; ``parameter``: one outside its prior
     ending : str
         What the course in time adds to the label of the law
     clock : str or None
@@ -71,8 +71,9 @@ class Hypothesis:
 
     @property
     def label(self) -> str:
-        """Name and place, and whether a memory goes on in the next recording."""
-        return f"{self.name}@{self.place}" + (" (carried on)" if self.how == "carried_on" else "")
+        """Name and place, and whether a law of time goes on in the next recording, or comes again every day."""
+        over = self.ending.replace("_", " ")
+        return f"{self.name}@{self.place}" + (f" ({over})" if self.how == "carried_on" else "")
 
     @property
     def mechanism(self) -> str:

@@ -13,6 +13,8 @@ from diagnosis.candidates.dated import (
     Axis,
     carried_on,
     changing,
+    comes_daily,
+    each_day,
     for_a_while,
     has_clock,
     in_one_of,
@@ -33,6 +35,7 @@ from diagnosis.setup.inference_setup import STANDSTILL_RPM, InferenceSetup
 from models.mechanisms import Placed
 from models.mechanisms.ageing import FAMILY as AGEING
 from models.mechanisms.forms import EDGE_S
+from models.mechanisms.measurement import DAY_S
 from models.quantities.quantities import is_total_loss
 
 DATES = 14  # of a long recording
@@ -84,6 +87,7 @@ def candidates_of(setup: InferenceSetup, experiment: Experiment) -> tuple[Hypoth
                 if len(course.variants)
             ),
             *(carried_on(one, axis) for one in placed if several and has_clock(one)),
+            *(each_day(one, axis) for one in placed if axis.hour is not None and axis.end > DAY_S and comes_daily(one)),
             *parameters_outside(experiment),
         )
     )
@@ -152,7 +156,7 @@ def axis_of(experiment: Experiment) -> Axis:
     end = max(last for _, last in spans.values())
     interval = float(np.median(np.concatenate([piece.steps for piece in experiment.pieces])))
     return Axis(dates=np.array(sorted(dates)), end=end, until=max(end, experiment.until),
-                edge_s=2.0 * max(EDGE_S, interval if experiment.slow else 0.0))  # fmt: skip
+                edge_s=2.0 * max(EDGE_S, interval if experiment.slow else 0.0), hour=experiment.hour)  # fmt: skip
 
 
 def _spans(experiment: Experiment) -> dict[str, tuple[float, float]]:

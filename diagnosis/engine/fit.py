@@ -44,6 +44,8 @@ class Experiment:
         determinants, so those of different filters can be compared
     starts_at : mapping of str to float
         Start of every recording on the time axis that they share, [s]
+    hour : float or None
+        Hour of the day (UTC) at which it begins; None: the recordings have no dates
     until : float
         End of the last one on it, held-out ones too, [s]
     session_of : mapping of str to str
@@ -67,6 +69,7 @@ class Experiment:
     starts: tuple[Array, ...]
     filters: tuple[Whitening, ...] | None = None
     starts_at: Mapping[str, float] = field(default_factory=dict)
+    hour: float | None = None
     until: float = 0.0
     session_of: Mapping[str, str] = field(default_factory=dict)
     healthy: frozenset[str] = frozenset()

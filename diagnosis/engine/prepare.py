@@ -21,7 +21,7 @@ from diagnosis.engine.unknown import (
 from diagnosis.forward.grid import slow_rows
 from diagnosis.recordings.recording import Recording
 from diagnosis.setup.inference_setup import InferenceSetup, prepare
-from diagnosis.setup.sessions import session_by_recording, start_times
+from diagnosis.setup.sessions import hour_of_start, session_by_recording, start_times
 from diagnosis.setup.shaft import torque_gain
 from diagnosis.setup.start import start_guess
 from models.assembly.gearbox import Gearbox
@@ -67,6 +67,7 @@ def prepare_experiment(
         healthy=frozenset(r.name for r in baseline),
         switched_off=frozenset(switched_off),
         starts_at=starts_at,
+        hour=hour_of_start([*recordings, *holdout]),
         until=max(starts_at[r.name] + float(r.time[-1]) for r in (*recordings, *holdout)),
     )
 

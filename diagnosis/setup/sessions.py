@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from datetime import UTC
 
 import numpy as np
 
@@ -58,6 +59,15 @@ def start_times(recordings: Sequence[Recording]) -> dict[str, float]:
         result |= {name: now + part.from_s - first for name, part in parts.items()}
         now += last - first
     return result
+
+
+def hour_of_start(recordings: Sequence[Recording]) -> float | None:
+    """Hour of the day (UTC) at which the axis of :func:`start_times` begins; None where not all have dates."""
+    dates = [recording.start for recording in recordings if recording.start is not None]
+    if len(dates) < len(recordings):
+        return None
+    first = min(dates).astimezone(UTC)
+    return first.hour + first.minute / 60.0 + first.second / 3600.0
 
 
 def check_baselines(

@@ -252,7 +252,7 @@ TEXTS: Mapping[str, Mapping[str, KeyText]] = {
         name="Name of the part; its temperature is T_<name>",
         heat_capacity_J_K=("Heat capacity: mass times 460 (steel), 500 (iron), 900 (aluminium), 2000 (oil) J/(kg K)",
                            "100 to 1e6"),
-        group="What mechanisms take it for: housing, bearings, or returns of the oil",
+        group="What mechanisms take it for: housing, bearings, gears, shafts, or returns of the oil",
     ),
     "Path": _texts(
         between="Two parts, or a part and a boundary; with geometry any of its nodes too",
@@ -279,6 +279,7 @@ TEXTS: Mapping[str, Mapping[str, KeyText]] = {
     "Loss": _texts(
         name="Name of the loss",
         part="Part that it warms",
+        kind="What loses it, for mechanisms: gears, bearings, seals or other; unless stated by its part and name",
         no_load_W=("Heat at the reference that does not depend on the load", "0.2 to 1 % of the rated power"),
         speed_exponent=("How that part goes with the speed", "1 to 2"),
         viscosity_exponent=("How that part goes with the viscosity", "0 to 0.6"),

@@ -10,6 +10,7 @@ from models.network.laws import LawLike, Parameter
 from models.terms.term import Form
 
 FAMILY = "measurement"
+DAY_S = 86400.0
 EXCHANGE = "exchange the sensor with another one and repeat: a fault of the sensor goes with it"
 EQUAL_TEMPERATURE = "hold a second thermometer next to it, or let all rest for a night: all must agree then"
 
@@ -128,6 +129,17 @@ clock_offset = _sensor(
     experiment="step the speed and look where temperatures begin to move; record one signal with both loggers",
 )
 
+clock_drift = _sensor(
+    "clock_drift",
+    "clock",
+    places="clock",
+    parameters=lambda scale: (strength(max(20.0, 3.0 * scale.interval), "s", "readings later every day by"),),
+    law=lambda s: s.strength * s.time / DAY_S,
+    says="The clock of the temperatures runs slow or fast against that of the inputs.",
+    reference="quartz of a logger: 2 s a day at 25 ppm; some are ten times worse",
+    experiment="step the speed at the beginning and at the end, and look where temperatures begin to move",
+)
+
 torque_offset = _input(
     "torque_offset",
     "torque",
@@ -196,6 +208,6 @@ ambient_probe_heated = _input(
 )
 
 MECHANISMS = (
-    sensor_bias, sensor_drift, sensor_gain, sensor_elsewhere, sensor_lag, sensor_stuck, swapped_channels, clock_offset, torque_offset,
-    torque_gain, speed_gain, ambient_probe_offset, ambient_probe_heated, ambient_follows_outdoor,
+    sensor_bias, sensor_drift, sensor_gain, sensor_elsewhere, sensor_lag, sensor_stuck, swapped_channels, clock_offset, clock_drift,
+    torque_offset, torque_gain, speed_gain, ambient_probe_offset, ambient_probe_heated, ambient_follows_outdoor,
 )  # fmt: skip
