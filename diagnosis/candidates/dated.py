@@ -20,7 +20,7 @@ from diagnosis.candidates.hypotheses import How, Hypothesis, hypothesis_of, law_
 from models.base.types import Array
 from models.formulas.extremes import Max, Min
 from models.mechanisms import Placed
-from models.mechanisms.forms import EDGE_S, steps
+from models.mechanisms.forms import EDGE_S, plain, positive, steps
 from models.network.laws import Parameter, symbol
 
 HOUR_S = 3600.0
@@ -290,12 +290,12 @@ def each_day(placed: Placed, axis: Axis) -> Hypothesis:
         away = sp.Mod(now - noon + HOURS_OF_DAY / 2.0, HOURS_OF_DAY) - HOURS_OF_DAY / 2.0
         return law.xreplace({symbol("time"): HOUR_S * (noon + away), noon: HOUR_S * noon})
 
-    own = {
-        NOON: {"unit": "h", "start": HOURS_OF_DAY / 2.0, "sd": HOURS_OF_DAY / 3.0, "lower": -HOURS_OF_DAY,
-               "upper": 2.0 * HOURS_OF_DAY, "grid": NOONS_H, "description": "hour of the day (UTC) of the most of it"},
-        LENGTH: {"start": LENGTHS_S[-1], "lower": 0.2 * LENGTHS_S[0], "upper": 3.0 * LENGTHS_S[-1], "grid": LENGTHS_S},
+    of_day = {
+        f"{label}_{NOON}": plain(NOON, HOURS_OF_DAY / 2.0, sd=HOURS_OF_DAY / 3.0, lower=-HOURS_OF_DAY,
+                                 upper=2.0 * HOURS_OF_DAY, unit="h", grid=NOONS_H),
+        f"{label}_{LENGTH}": positive(LENGTH, LENGTHS_S[-1], sd=0.8, unit="s", grid=LENGTHS_S),
     }  # fmt: skip
-    parameters = tuple(replace(p, **own.get(p.name.removeprefix(f"{label}_"), {})) for p in term.parameters)
+    parameters = tuple(replace(of_day.get(p.name, p), name=p.name) for p in term.parameters)
     term = replace(
         term, expression=daily(term.expression, symbol(f"{label}_{NOON}"), symbol(clock.name)), parameters=parameters,
         written={key: daily(law, symbol(NOON), symbol(START)) for key, law in term.written.items()},

@@ -38,7 +38,8 @@ class Hypothesis:
         Values of the term's parameters that are tried, the strength 1
     how : str
         ``always``: as the law has it; ``from_date``: from a date on, or between two; ``carried_on``: a law of time that
-        goes on in the next recording, or comes again every day; ``over_hours``: slowly; ``parameter``: one outside its prior
+        goes on in the next recording, or comes again every day; ``over_hours``: slowly; ``parameter``: one outside its
+        prior
     ending : str
         What the course in time adds to the label of the law
     clock : str or None

@@ -62,7 +62,7 @@ def start_times(recordings: Sequence[Recording]) -> dict[str, float]:
 
 
 def hour_of_start(recordings: Sequence[Recording]) -> float | None:
-    """Hour of the day (UTC) at which the axis of :func:`start_times` begins; None where not all have dates."""
+    """Hour of the day (UTC) at which the axis of :func:`start_times` begins; None if not all have dates."""
     dates = [recording.start for recording in recordings if recording.start is not None]
     if len(dates) < len(recordings):
         return None

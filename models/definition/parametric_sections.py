@@ -68,7 +68,7 @@ class TorqueFromPower(Section):
 class Loss(Section):
     """``[[loss]]``: heat in a part at the reference, without load and by the load, and how it goes with operation.
 
-    `kind` says what loses it. Unless stated, a loss in a part of the group of bearings is theirs, one whose name begins
+    `kind` is what loses it. Unless stated, a loss in a part of the group of bearings is theirs, one whose name begins
     with ``seal`` that of seals, and any other that of gears: churning without load, sliding by the load.
     """
 

@@ -38,6 +38,7 @@ MEANINGS = {
     ("load_share", "1"): "share that grows with the torque",
     ("moment", "s"): "time since the start of the recording",
     ("neighbour", "degC"): "temperature of the neighbour",
+    ("noon", "h"): "hour of the day (UTC) at which it is at its height",
     ("noon", "s"): "time of the most sun, since the start of the recording",
     ("onset", "1"): "relative speed at which it begins",
     ("onset", "s"): "time of the first one, since the start of the recording",

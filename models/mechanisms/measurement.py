@@ -76,7 +76,7 @@ sensor_elsewhere = _sensor(
     parameters=lambda _: (share("share of the neighbour in the reading; 1: it sits there"),),
     law=lambda s: s.strength * (s.T_there - s.T_here),
     says="The sensor sits on a neighbour of the part that it is named after, or feels it ({place}).",
-    reference="mounting: a probe in the wrong hole or fallen off, a thermowell that ends in the wall; the share is ours",
+    reference="mounting: a probe in the wrong hole, a thermowell that ends in the wall; a hypothesis",
     experiment="look where the sensor sits, or warm that part by hand and see whether the channel moves",
     signed=False,
 )
@@ -208,6 +208,7 @@ ambient_probe_heated = _input(
 )
 
 MECHANISMS = (
-    sensor_bias, sensor_drift, sensor_gain, sensor_elsewhere, sensor_lag, sensor_stuck, swapped_channels, clock_offset, clock_drift,
-    torque_offset, torque_gain, speed_gain, ambient_probe_offset, ambient_probe_heated, ambient_follows_outdoor,
+    sensor_bias, sensor_drift, sensor_gain, sensor_elsewhere, sensor_lag, sensor_stuck, swapped_channels, clock_offset,
+    clock_drift, torque_offset, torque_gain, speed_gain, ambient_probe_offset, ambient_probe_heated,
+    ambient_follows_outdoor,
 )  # fmt: skip
