@@ -126,6 +126,11 @@ def _mapped_columns(file: RecordingFile, present: Sequence[str], machine: Record
                 f"column {name} is {column.quantity!r} in its mapping file, which this gearbox does not have"
                 + did_you_mean(column.quantity, known)
             )
+        elif column.sensor is not None and column.quantity in machine.inputs:
+            problems.add(
+                f"column {name} has sensor = {column.sensor!r} in its mapping file, but {column.quantity} is an input "
+                f'and has one column; leave sensor out there, and name further ones with quantity = "{AUXILIARY}"'
+            )
         else:
             roles[name] = column
     for name in mapping.constants:

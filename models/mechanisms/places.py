@@ -158,9 +158,9 @@ def _held(network: ThermalNetwork, holder: str, held: str) -> Iterator[Placement
     for member in _members(network, holder):
         neighbours = {node for link in network.links if member in link.nodes for node in link.nodes}
         nodes = tuple(node for node in _members(network, held) if node in neighbours)
-        target = tuple(source.name for source in network.sources if source.is_loss and source.node in nodes)
-        if len(target) > 1:
-            yield Placement(name=f"{held}_of_{member}", target=target, here=nodes)
+        losses = [source for source in network.sources if source.is_loss and source.node in nodes]
+        if len({source.node for source in losses}) > 1:
+            yield Placement(name=f"{held}_of_{member}", target=tuple(source.name for source in losses), here=nodes)
 
 
 def _links(network: ThermalNetwork, pattern: str) -> Iterator[Placement]:

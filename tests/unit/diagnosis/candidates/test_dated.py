@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,8 @@ from diagnosis.candidates.dated import (
     Axis,
     carried_on,
     changing,
+    comes_daily,
+    each_day,
     for_a_while,
     has_clock,
     may_change,
@@ -116,6 +120,31 @@ def test_a_law_of_time_is_carried_on(fzg: Gearbox) -> None:
     assert isinstance(hypothesis.term, Placed)
     own = {"strength": -0.3, "life": 1000.0}
     assert value(hypothesis.term, 500.0, 4500.0, **own) == pytest.approx(-0.3 * (1 - np.exp(-5.0)))
+
+
+def test_a_clock_that_drifts_goes_on_in_the_next_recording(fzg: Gearbox) -> None:
+    placed = CATALOGUE["clock_drift"].placed(fzg.network(), Scale.of(fzg))[0]
+    hypothesis = carried_on(placed, AXIS)
+    assert isinstance(hypothesis.term, Placed)
+    assert value(hypothesis.term, 1800.0, 10 * 86400.0 - 1800.0, strength=12.0) == pytest.approx(120.0)
+    assert set(np.sign(hypothesis.variants[:, 0])) == {-1.0, 1.0}
+
+
+def test_sun_comes_every_day_at_one_hour(fzg: Gearbox) -> None:
+    """Recordings begin at different hours; the height is at 11 h, the first begins at 7:30."""
+    sun = CATALOGUE["solar_soak"].placed(fzg.network(), Scale.of(fzg))
+    assert comes_daily(sun[0]) and not comes_daily(CATALOGUE["windage"].placed(fzg.network(), Scale.of(fzg))[0])
+    hypothesis = each_day(sun[0], replace(AXIS, hour=7.5))
+    assert isinstance(hypothesis.term, Placed)
+    own = {"strength": 40.0, "noon": 11.0, "length": 3600.0}
+    for day in (0, 1, 5):
+        at = [
+            value(hypothesis.term, 600.0, (24 * day + hour - 7.5) * 3600.0 - 600.0, **own) for hour in (10, 11, 12, 23)
+        ]
+        assert at == pytest.approx([40.0 * np.exp(-1.0), 40.0, 40.0 * np.exp(-1.0), 0.0], abs=1e-9)
+    before_midnight = {**own, "noon": 0.5}
+    assert value(hypothesis.term, 0.0, 16.0 * 3600.0, **before_midnight) == pytest.approx(40.0 * np.exp(-1.0))
+    assert hypothesis.term.says.startswith("Every day at one hour: sun")
 
 
 @pytest.mark.parametrize("name", ["fzg", "conveyor", "heated_rod", "la_haute_borne"])

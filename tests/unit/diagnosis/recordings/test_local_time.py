@@ -157,6 +157,13 @@ def test_columns_next_to_mapped_ones(tmp_path: Path, network: ThermalNetwork) ->
     assert "not used, because the mapping takes other columns for them: speed_rpm" in found.notes
 
 
+def test_an_input_has_one_column(tmp_path: Path, network: ThermalNetwork) -> None:
+    """Else the default of the definition would take its place without a word."""
+    table().to_csv(tmp_path / "run.csv", index=False)
+    with pytest.raises(InputError, match="sensor = 'hall' .* T_ambient is an input and has one column"):
+        read(tmp_path / "run.csv", network, 'columns = { T_oil_degC = { quantity = "T_ambient", sensor = "hall" } }')
+
+
 def test_a_decimal_point_where_a_comma_is_stated(tmp_path: Path, network: ThermalNetwork) -> None:
     table().to_csv(tmp_path / "run.csv", index=False, sep=";")
     with pytest.raises(InputError, match="its decimal sign is a point"):

@@ -347,3 +347,41 @@ def test_coolers_and_heaters_switch_the_other_way_round_also_in_means(above, col
                              (55.0, 0.0, 0.0), (55.0, 1.0, 1.0)):  # fmt: skip
             signals = SimpleNamespace(T_oil=sp.Float(T), valve=sp.Float(was), set_point=55.0, band=6.0)
             assert float(law(signals)) == pytest.approx(then, abs=1e-6)
+
+
+# ---------------------------------------------------------------------- places of mechanisms
+
+
+def places(text, name):
+    gearbox = read_gearbox(text, file="mine.toml")
+    found = CATALOGUE[name].placed(gearbox.network(), Scale.of(gearbox))
+    return {term.place: term.target for term in found}
+
+
+def test_losses_are_what_their_part_and_name_tell():
+    """Gears churn without load and slide by it; all of a bearing is one place; seals go by their name."""
+    assert places(TEXT, "oil_level_thermal") == {"churning": ("gears_no_load",)}
+    assert places(TEXT, "gear_wear") == {"mesh_sliding": ("gears_load",)}
+    bearings = tuple(f"bearing_{i}_{kind}" for i in (1, 2) for kind in ("no_load", "load"))
+    assert places(TEXT, "bearing_additive") == {"bearing": bearings}
+    assert places(TEXT, "misalignment") == {
+        "mesh_sliding": ("gears_load",), "bearing_1": bearings[:2], "bearing_2": bearings[2:],
+    }  # fmt: skip
+    assert places(TEXT, "run_in_seals") == {}
+    seal = '[[loss]]\nname = "seals"\npart = "casing"\nno_load_W = 300.0\nload_W = 0.0\n'
+    assert places(TEXT + seal, "run_in_seals") == {"seal": ("seals_no_load",)}
+    assert places(TEXT + seal, "oil_level_thermal") == {"churning": ("gears_no_load",)}
+    pump = seal.replace('"seals"', '"pump"').replace("no_load_W", 'kind = "other"\nno_load_W')
+    assert places(TEXT + pump, "oil_level_thermal") == {"churning": ("gears_no_load",)}
+
+
+def test_gears_are_taken_for_the_shafts_where_these_are_no_part():
+    assert places(TEXT, "bearing_preload") == places(TEXT, "brake_drag") == {}
+    part = '[[part]]\nname = "gears"\nheat_capacity_J_K = 1e5\n[[link]]\nbetween = ["gears", "bearing_1"]\n'
+    text = TEXT + part + "conductance_W_K = 50.0\n"
+    assert places(text, "brake_drag") == {"gears": ("gears",)}
+    assert set(places(text, "bearing_preload")) == {"bearing", "bearing_1", "bearing_2"}
+    both = text + part[part.index("[[link]]") :].replace("bearing_1", "bearing_2") + "conductance_W_K = 50.0\n"
+    assert set(places(both, "bearing_preload")) == {"bearing", "bearing_1", "bearing_2"}
+    shaft = part.replace('"gears"', '"rotor"').replace("1e5", '1e5\ngroup = "shafts"')
+    assert places(text + shaft + "conductance_W_K = 5.0\n", "brake_drag") == {"rotor": ("rotor",)}
