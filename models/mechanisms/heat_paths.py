@@ -16,7 +16,7 @@ foundation_conduction = Mechanism(
     name="foundation_conduction",
     family=FAMILY_OUT,
     kind="source",
-    places=("each housing", "housing"),
+    places=("each housing", "housing", "each others"),
     parameters=lambda scale: (
         strength(0.4 * scale.conductance, "W/K", "from here through the foundation to the air, once it is warm"),
         positive("feet", 1.0, sd=1.5, grid=(0.02, 0.5, 3.0, 15.0)),
@@ -44,7 +44,7 @@ hot_neighbour = Mechanism(
     name="hot_neighbour",
     family=FAMILY_OUT,
     kind="link",
-    places=("each housing", "housing", "each shafts"),
+    places=("each housing", "housing", "each shafts", "each others"),
     other="neighbour",
     other_temperature=lambda s: s.neighbour,
     parameters=lambda scale: (

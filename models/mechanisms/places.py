@@ -2,8 +2,9 @@
 
 A pattern is a name, a group (its members together), or ``each`` and a group (one place per member), by kind:
 
-- source, link: nodes. ``oil``, ``housing``, ``each bearings``, ``each parts`` (of all there are); of a link also both
-  ends, ``each bearings-returns``, the other one a boundary or a group of one
+- source, link: nodes. ``oil``, ``housing``, ``each bearings``, ``each parts`` (of all there are), ``each others`` (a
+  base frame or a tank: those of no group that are not inside); of a link also both ends, ``each bearings-returns``, the
+  other one a boundary or a group of one
 - loss_factor: sources. ``losses``, all that are mechanical; ``mesh_sliding``, where there are several stages that of
   all, and that of each; the losses in a group of nodes,
   ``each bearings``; those in the nodes of a group that hang on one member of another, ``each shafts>bearings``; those
@@ -29,7 +30,8 @@ from models.quantities.quantities import node_of_channel
 from models.simulation.thermal_network import Source, ThermalNetwork
 from models.terms.term import Kind
 
-EACH, FACTOR, ALL_LOSSES, ALL_PARTS = "each ", "factor ", "losses", "parts"
+EACH, FACTOR, ALL_LOSSES, ALL_PARTS, OTHERS = "each ", "factor ", "losses", "parts", "others"
+INSIDE = ("oil", "gears", "mesh")  # parts that no surroundings touch
 STAGE_NUMBER = re.compile(r"_\d+$")
 
 
@@ -99,6 +101,9 @@ def _apart(pattern: str) -> tuple[bool, str]:
 def _members(network: ThermalNetwork, name: str) -> tuple[str, ...]:
     if name == ALL_PARTS:
         return tuple(part.name for part in network.parts)
+    if name == OTHERS:
+        grouped = {*INSIDE, *(member for members in network.groups.values() for member in members)}
+        return tuple(part.name for part in network.parts if part.name not in grouped)
     return network.groups.get(name, (name,) if name in network.node_names else ())
 
 
