@@ -17,6 +17,7 @@ from diagnosis.results.result_parts import (
     NO_CLAIM,
     Change,
     Finding,
+    Location,
     named,
     title_of,
 )
@@ -49,6 +50,7 @@ UNFIT = "The model cannot be brought to fit these recordings, and why has no nam
 SIZES = {0.5: "half as large", 1.0: "as assumed", 2.0: "twice as large"}  # of model error, by factor
 MOST_FAR = 3  # parameters far from their priors that the summary tells of
 MOST_UNSEEN = 6  # effects that the summary names of those that cannot be seen
+MOST_TOGETHER = 3  # parts of one place that are all named
 OF_DATE = ("since", "lasting")  # parameters that the date contains
 OF_SWITCH = ("set_point", "band")  # parameters that the switching temperatures contain
 LONG_S = 7200.0  # times beyond are told in hours
@@ -175,9 +177,9 @@ def _where(d: Diagnosis) -> tuple[str, ...]:
         return ()
     if d.verdict in NO_CLAIM:
         likely = [place for place in d.location[:MOST_NEAREST] if place.probability >= NEAREST]
-        told = ", ".join(f"{' and '.join(place.nodes)} ({share(place.probability)})" for place in likely)
+        told = _places_told(likely)
         return (f"If something is missing all the same, most probably in {told}",) if told else ()
-    told = ", ".join(f"{' and '.join(place.nodes)} ({share(place.probability)})" for place in d.places)
+    told = _places_told(d.places)
     place = next((one for one in d.places if one.heat_max_W), None)
     if place is None:
         fault = d.verdict == "sensor_fault" or d.location[0].node not in d.network.node_names
@@ -187,6 +189,16 @@ def _where(d: Diagnosis) -> tuple[str, ...]:
     where = "" if place is d.places[0] else f"in {' and '.join(place.nodes)} "
     heat = f"{where}{mean} W {way} on average, {most} W at most"
     return (f"{told}; {heat}; {place.regime}",)
+
+
+def _places_told(places: Sequence[Location]) -> str:
+    named = (
+        f"{', '.join(place.nodes[:2])} and {len(place.nodes) - 2} more"
+        if len(place.nodes) > MOST_TOGETHER
+        else " and ".join(place.nodes)
+        for place in places
+    )
+    return ", ".join(f"{name} ({share(place.probability)})" for name, place in zip(named, places, strict=True))
 
 
 def _what(d: Diagnosis) -> tuple[str, ...]:

@@ -55,7 +55,8 @@ def _place(
     effects = [effect for effect in (judged.effects if judged else ()) if nodes[effect.label] == node]
     warm = [(effect, heats) for effect in effects if fit is not None and (heats := heats_of(fit, effect))]
     if fit is None or not warm:
-        return Location(nodes=(node,), probability=min(weight, 1.0), heat_mean_W=0.0, heat_max_W=0.0, when=(),
+        nodes_there = nodes_in(setup.nominal, effects[0]) if effects else (node,)
+        return Location(nodes=nodes_there, probability=min(weight, 1.0), heat_mean_W=0.0, heat_max_W=0.0, when=(),
                         regime="always")  # fmt: skip
     here, heat = warm[0]
     tested = fit.experiment.tested

@@ -26,9 +26,10 @@ def node_in(network: ThermalNetwork, h: Hypothesis) -> str:
 
 
 def nodes_in(network: ThermalNetwork, h: Hypothesis) -> tuple[str, ...]:
-    """All parts that share the heat of a hypothesis, :func:`node_in` first; at most places it is one."""
+    """All parts that share the heat or the fault of a hypothesis, :func:`node_in` first; at most places it is one."""
     term = h.term
-    shared = () if term is None else {"source": term.target, "link": term.target[:-1]}.get(term.kind, ())
+    several = {} if term is None else {"source": term.target, "link": term.target[:-1], "sensor": term.target}
+    shared = () if term is None else several.get(term.kind, ())
     return tuple(dict.fromkeys((node_in(network, h), *(node for node in shared if node in network.node_names))))
 
 

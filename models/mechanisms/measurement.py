@@ -133,7 +133,7 @@ clock_drift = _sensor(
     "clock_drift",
     "clock",
     places="clock",
-    parameters=lambda scale: (strength(max(20.0, 3.0 * scale.interval), "s/d", "readings late by so much more every day"),),
+    parameters=lambda scale: (strength(max(20.0, 3.0 * scale.interval), "s/d", "further delay of the readings"),),
     law=lambda s: s.strength * s.time / DAY_S,
     says="The clock of the temperatures runs slow or fast against that of the inputs.",
     reference="quartz of a logger: 2 s a day at 25 ppm; some are ten times worse",
