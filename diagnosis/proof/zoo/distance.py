@@ -15,17 +15,16 @@ import numpy as np
 from diagnosis.engine.fit import NO_SOLUTION, Experiment
 from diagnosis.engine.point import Machine, Point
 from diagnosis.engine.prepare import usual_unknowns
-from diagnosis.engine.unknown import NetworkParameter
-from diagnosis.forward.grid import pieces
+from diagnosis.engine.unknown import NetworkParameter, Unknown
+from diagnosis.forward.grid import Piece, pieces
 from diagnosis.forward.network_on_grid import NetworkOnGrid
-from diagnosis.forward.trajectory import Trajectory
+from diagnosis.forward.whitening import Noise
 from diagnosis.proof.plant.cycles import TRAIN, Programme
 from diagnosis.proof.zoo.families.family import Family
 from diagnosis.proof.zoo.programmes import MINUTES_S, programmes
 from diagnosis.proof.zoo.simulate import simulate
 from diagnosis.proof.zoo.structure import Variant, ZooPlant
 from diagnosis.recordings.recording import Channel, Recording
-from diagnosis.setup.noise import noise_of
 from diagnosis.setup.shaft import shafts, torque_gain, with_shaft
 from diagnosis.setup.start import start_guess
 from models.assembly.gearbox import Gearbox, load_gearbox
@@ -35,9 +34,9 @@ from models.base.types import Array
 ACCEPTED_K, ACCEPTED_SLOW_K = (0.2, 1.0), (0.5, 3.0)  # gearboxes; machines without geometry in means of minutes
 WIDER = 2.0  # times the priors' standard deviations: a factor may go where the data want it
 PER_ROW_K = 5.0  # sd of one row: the fit follows the data, the priors hold what they do not show
-ITERATIONS = 12
+ITERATIONS = 30
+SURE_K = 1e-3  # of start temperatures
 THINNED = 3  # of rows of 10 s the plant runs every third here: what it does takes minutes
-SETTLED = 0.02  # relative fall of the rms that ends the fit
 OIL_DEGC, HOTTEST_DEGC = (30.0, 120.0), 150.0  # the hottest oil of a plausible gearbox, and its hottest reading
 MOST_DRAWS = 60
 
@@ -145,58 +144,35 @@ def _experiment(gearbox: Gearbox, recordings: Sequence[Recording]) -> Experiment
     model = NetworkOnGrid(network, gearbox.loss_laws())
     channels = sorted((c.name for c in recordings[0].channels), key=lambda name: (model.part_index(name), name))
     cut = pieces(recordings, model.laws.inputs, channels)
-    white = dict.fromkeys(channels, 0.1)
     stated = {p.name: p for p in network.parameters}  # priors of the definition, capacities as narrow as it has them
     usual = usual_unknowns(network, recordings, channels, interval=1.0, gain_of_torque=gain)
     return Experiment(
         machine=Machine(model),
         pieces=tuple(cut),
         unknowns=tuple(
-            replace(u, parameter=stated[u.parameter.name]) if isinstance(u, NetworkParameter) else u for u in usual
+            _wider(replace(u, parameter=stated[u.parameter.name]) if isinstance(u, NetworkParameter) else u)
+            for u in usual
         ),
-        noise=tuple(noise_of(model, piece, white, 1.0, parametric=gearbox.is_parametric) for piece in cut),
+        noise=tuple(_per_row(model, piece) for piece in cut),
         starts=tuple(start_guess(model, piece) for piece in cut),
     )
 
 
+def _wider(unknown: Unknown) -> Unknown:
+    return replace(unknown, parameter=replace(unknown.parameter, sd=WIDER * unknown.parameter.sd))
+
+
+def _per_row(model: NetworkOnGrid, piece: Piece) -> Noise:
+    """The same for every row of every channel, and start temperatures as they are."""
+    channels = len(piece.channels)
+    return Noise(channel_sd=np.full(channels, PER_ROW_K), floor_sd=np.zeros(channels), loss_relative_sd=0.0,
+                 heat_sd=np.zeros(model.n), heat_time=1.0, start=SURE_K**2 * np.eye(model.n))  # fmt: skip
+
+
 def _fitted_rms(experiment: Experiment) -> float:
     """Root mean square of the residual at the least squares over all rows, [K]."""
-    lower, upper = experiment.bounds
-    z, points, best, damping = np.zeros(len(experiment.unknowns)), None, np.inf, 1e-2
-    guesses: Sequence[Trajectory | None] = [None] * len(experiment.pieces)
-    tried = z
-    for _ in range(ITERATIONS):
-        trial = [experiment.point(i, tried, guess, rounds=3) for i, guess in enumerate(guesses)]
-        rms = _rms(trial)
-        if points is None or rms < best:
-            settled = rms > (1.0 - SETTLED) * best
-            z, points, best, damping = tried, trial, rms, 0.3 * damping
-            guesses = [point.trajectory for point in points]
-            if settled:
-                break
-        else:
-            damping *= 30.0
-        step = _step(experiment, points, z, damping)
-        tried = np.clip(z + np.clip(step, -3.0, 3.0), lower, upper)
-    return best
-
-
-def _step(experiment: Experiment, points: Sequence[Point], z: Array, damping: float) -> Array:
-    normal, right = np.eye(len(z)) / WIDER**2, -z / WIDER**2
-    for point in points:
-        residual, columns = _weighted(point, experiment.columns(point, z))
-        normal = normal + columns.T @ columns / PER_ROW_K**2
-        right = right + columns.T @ residual / PER_ROW_K**2
-    return np.asarray(np.linalg.solve(normal + damping * np.diag(np.diag(normal)), right))
-
-
-def _weighted(point: Point, columns: Array) -> tuple[Array, Array]:
-    """Residual and columns of all readings, weighted by the width of the intervals."""
-    time, residual = point.trajectory.piece.time, point.residual
-    width = np.sqrt(np.gradient(time) / np.median(np.diff(time)))
-    seen = np.isfinite(residual)
-    weight = np.broadcast_to(width[:, None], seen.shape)[seen]
-    return residual[seen] * weight, columns[seen] * weight[:, None]
+    fit = experiment.fit(np.zeros(len(experiment.unknowns)), iterations=ITERATIONS)
+    return _rms([part.point for part in fit.parts])
 
 
 def _rms(points: Sequence[Point]) -> float:
