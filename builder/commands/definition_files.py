@@ -22,8 +22,8 @@ SCHEMA_FILE = "definition.schema.json"
 @click.command("new", epilog=example("new mine.toml --like conveyor"))
 @click.argument("file", type=click.Path(path_type=Path), metavar="FILE")
 @click.option("--like", type=click.Choice(known_gearboxes()), default="fzg", show_default=True,
-              help="Machine of the package to begin from: with geometry fzg, conveyor and helical, without heated_rod, "
-                   "la_haute_borne and reducer.")  # fmt: skip
+              help="Machine of the package to begin from: heated_rod, la_haute_borne and reducer have no geometry, the "
+                   "others have one.")  # fmt: skip
 @click.option("--replace", is_flag=True, help="Write over a file that exists.")
 def new(file: Path, like: str, replace: bool) -> None:
     """Begin a commented definition of your own machine.
