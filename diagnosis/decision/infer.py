@@ -53,7 +53,6 @@ SETTLED_NAT, MOST_TURNS = 0.1, 5  # gain at which a fit has ended; how often it 
 IMPOSSIBLE = -1e3  # nats
 FAR_BETTER = 10.0  # nats, from which the calibration was in the wrong basin
 SCALED = (0.5, 1.0, 2.0)  # of the amplitudes of model error: what the scan says with each
-FAR_SD = 4.0  # of a prior, from which a calibration without the effect may be far from the machine with it
 WORTH, WORTH_SHARE = 1.0, 0.1  # nats, and share of the best, from which a candidate is worth a fit
 
 
@@ -84,7 +83,7 @@ def infer(
     found = replace(found, candidates=candidates)
     first = scan_in_classes(calibration, found)
     starts: list[tuple[Scanned, StartOf]] = [(first, lambda one: calibration.in_class(one).fit)]
-    if float(np.max(np.abs(base.z), initial=0.0)) > FAR_SD:
+    if calibration.is_far:
         progress("scanning from the middles of the priors too")
         with suppress(ArithmeticError):
             middles = scan(calibration.at_middles(chosen.error_class), candidates, calibration.near.columns)

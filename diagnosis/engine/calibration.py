@@ -21,6 +21,7 @@ from models.base.types import Array
 TURNS = 3  # with the chosen class: point, columns of model error and deviation between sessions settle together
 LONGEST = 16.0  # times as long as assumed, random heats may last where only the form of the laws is known
 WORTH = 1.0  # nats that another random heat has to bring
+FAR_SD = 4.0  # of a prior, from which a calibration without the effect may be far from the machine with it
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -204,6 +205,11 @@ class Calibration:
         return self.chosen.fit
 
     @property
+    def is_far(self) -> bool:
+        """True if an unknown is far from the middle of its prior: the machine may be another one."""
+        return float(np.max(np.abs(self.fit.z), initial=0.0)) > FAR_SD
+
+    @property
     def classes(self) -> tuple[ErrorClass, ...]:
         """Classes that candidates are judged in: all, or that of the sound channels where others were set apart.
 
@@ -274,7 +280,22 @@ def _calibrated(experiment: Experiment, error: ModelError, start: Fit) -> Calibr
     fit = max(first, key=lambda one: one.log_evidence).fit
     near = NearReadings.of(experiment, error, fit)
     random_heat = near.most_probable(near.evidence_of(widest, fit.z), AS_ASSUMED)
-    return _with_random_heat(experiment.with_random_heat(random_heat), error, fit)
+    return _from_middles(_with_random_heat(experiment.with_random_heat(random_heat), error, fit))
+
+
+def _from_middles(calibration: Calibration) -> Calibration:
+    """The calibration, or a more probable one that is reached from the middles of the priors, if it is far from them.
+
+    A few steps do not tell yet which start is better.
+    """
+    if not calibration.is_far:
+        return calibration
+    try:
+        start = calibration.at_middles(calibration.chosen.error_class)
+        reached = start.experiment.fit(start.z, iterations=ITERATIONS, at=start.linearised)
+    except NO_SOLUTION:
+        return calibration
+    return recalibrate(calibration, reached)
 
 
 def _with_random_heat(experiment: Experiment, error: ModelError, fit: Fit) -> Calibration:
