@@ -33,6 +33,7 @@ from diagnosis.decision.scanned import (
     scan_in_classes,
 )
 from diagnosis.decision.settings import Settings
+from diagnosis.engine import calibration as calibration_module
 from diagnosis.engine.calibration import Calibration, calibrate_with_error, recalibrate
 from diagnosis.engine.families import axis_of, changes, parameters_outside
 from diagnosis.engine.fit import Experiment, Fit, calibrate
@@ -344,7 +345,7 @@ def test_fits_begin_at_the_middles_of_the_priors_too_where_the_calibration_went_
         return refitted(fit, found, index, steps)
 
     monkeypatch.setattr(infer_module, "_refitted", begins)
-    monkeypatch.setattr(infer_module, "FAR_SD", far_sd)
+    monkeypatch.setattr(calibration_module, "FAR_SD", far_sd)
     posterior = infer(calibration, scan_at(calibration, [hypothesis_of(one) for one in placed]), Settings())
     assert begun == ([False, True] if far_sd == 0.0 else [False])
     best = max(posterior.judged, key=lambda one: one.weight)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from diagnosis.engine import calibration as calibration_module
 from diagnosis.engine.calibration import (
     Calibration,
     NearReadings,
@@ -62,6 +63,20 @@ def test_where_another_start_is_no_better_or_has_no_solution_all_stays(
 
     monkeypatch.setattr(NearReadings, "of", fails)
     assert recalibrate(found, found.fit) is found
+
+
+@pytest.mark.parametrize("far_sd", [0.0, np.inf])
+def test_a_machine_far_from_what_is_stated_is_calibrated_from_there_too(
+    found: Calibration, monkeypatch: pytest.MonkeyPatch, far_sd: float
+) -> None:
+    """Where it had ended, readings are explained worse."""
+    worse = replace(found, chosen=replace(found.chosen, log_evidence=found.chosen.log_evidence - 100.0))
+    monkeypatch.setattr(calibration_module, "FAR_SD", far_sd)
+    reached = calibration_module._from_middles(worse)
+    if far_sd:
+        assert reached is worse
+    else:
+        assert reached.chosen.log_evidence > found.chosen.log_evidence - 5.0
 
 
 def test_it_has_settled(found: Calibration) -> None:
