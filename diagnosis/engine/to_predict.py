@@ -199,18 +199,24 @@ def _levelled(
 
 def _by_level(free: Experiment, off_K: float) -> Experiment:
     """Experiment without random heat in which an hour counts as one reading of every channel, off by `off_K`."""
-
-    def noise(index: int) -> Noise:
-        piece, known = free.pieces[index], free.noise[index]
-        seen = np.isfinite(piece.measured)
-        rows = np.where(seen, piece.counts, 0.0).sum(axis=0)
-        level = np.abs(np.nansum(piece.measured, axis=0)) / np.maximum(seen.sum(axis=0), 1)
-        off = np.where([is_total_loss(name) for name in piece.channels], LOSS_SHARE * level, off_K)
-        as_one = np.sqrt(np.maximum(rows, 1.0) / _readings(free, index))
-        return replace(known.with_random_heat(NO_RANDOM_HEAT), channel_sd=np.maximum(known.channel_sd, off * as_one))
-
-    noises = tuple(noise(index) for index in range(len(free.pieces)))
+    noises = tuple(_off(free, index, off_K).with_random_heat(NO_RANDOM_HEAT) for index in range(len(free.pieces)))
     return replace(free, noise=noises, random_heat=NO_RANDOM_HEAT, filters=None)
+
+
+def loss_by_level(experiment: Experiment) -> Experiment:
+    """Experiment that judges a measured loss no finer than what predicts has been calibrated to it."""
+    return replace(experiment, noise=tuple(_off(experiment, index, 0.0) for index in range(len(experiment.pieces))))
+
+
+def _off(experiment: Experiment, index: int, off_K: float) -> Noise:
+    """Noise of a piece in which an hour of a channel counts as one reading, which is off by so much at least."""
+    piece, known = experiment.pieces[index], experiment.noise[index]
+    seen = np.isfinite(piece.measured)
+    rows = np.where(seen, piece.counts, 0.0).sum(axis=0)
+    level = np.abs(np.nansum(piece.measured, axis=0)) / np.maximum(seen.sum(axis=0), 1)
+    off = np.where([is_total_loss(name) for name in piece.channels], LOSS_SHARE * level, off_K)
+    as_one = np.sqrt(np.maximum(rows, 1.0) / _readings(experiment, index))
+    return replace(known, channel_sd=np.maximum(known.channel_sd, off * as_one))
 
 
 def _readings(experiment: Experiment, index: int) -> float:

@@ -22,6 +22,8 @@ FAR_TIMES = 10.0  # which others exceed so many times that they may be codes of 
 CODES, CODE_TIMES = (999.0, 9999.0, 99999.0, 32767.0, 32768.0, 65535.0), 1.5  # of loggers; beyond what is usual
 FAHRENHEIT_K, NEARER = 15.0, 4.0  # above the others at least, if from -20 degC on; times nearer once it is converted
 COLDER_K = 3.0  # below the ambient air on average
+RESTS_RPM, FEWEST_AT_REST = 1.0, 30  # 1/min; rows
+ZERO_SHARE, ZERO_SPREAD = (0.01, 0.25), 0.3  # of the largest torque; of the torque at rest itself
 FAR_SDS = 4.0  # of a stated tolerance, from which a start is odd all the same
 LEAST_LOSS, MOST_LOSS = 1e-3, 5.0  # of the power, on average; without load all of the power, and more, is lost
 BRIEF_S, WARMED_K = 300.0, 15.0  # no gearbox warms that fast
@@ -37,7 +39,8 @@ def doubts(found: RecordedRows) -> list[str]:
         In the units inside, impossible values and outliers taken out
     """
     looked_at = (
-        _time_in_another_unit, _hot, _one_in_degF, _off_when_cold, _colder_than_ambient, _far_rows, _loss_and_power,
+        _time_in_another_unit, _hot, _one_in_degF, _off_when_cold, _colder_than_ambient, _far_rows,
+        _torque_at_rest, _loss_and_power,
     )  # fmt: skip
     return [note for each in looked_at for note in each(found)]
 
@@ -115,6 +118,24 @@ def _off_when_cold(found: RecordedRows) -> Iterator[str]:
                 f"{found.names[quantity]} begins {abs(first - middle):.1f} K {'above' if first > middle else 'below'} "
                 f"the other thermometers, which agree as in a machine that has stood still: {advice}"
             )
+
+
+def _torque_at_rest(found: RecordedRows) -> Iterator[str]:
+    """Note a constant torque at rest that is small next to that in operation: a rig that is clamped has more."""
+    if not {"speed", "torque"} <= {*found.names}:
+        return
+    torque = found.values["torque"]
+    seen = np.isfinite(torque)
+    rest = torque[seen & (np.abs(found.values["speed"]) < RESTS_RPM)]
+    if len(rest) < FEWEST_AT_REST:
+        return
+    low, zero, high = np.quantile(rest, [0.05, 0.5, 0.95])
+    share = abs(zero) / float(np.quantile(np.abs(torque[seen]), USUAL_SHARE))
+    if ZERO_SHARE[0] < share < ZERO_SHARE[1] and high - low < ZERO_SPREAD * abs(zero):
+        yield (
+            f"{found.names['torque']} is {zero:.3g} N m in the rows at rest: if nothing loads the shaft there, that is "
+            "the zero of the torque meter, and all other rows are as far off"
+        )
 
 
 def _colder_than_ambient(found: RecordedRows) -> Iterator[str]:

@@ -24,7 +24,7 @@ from diagnosis.results.held_out import validate
 from diagnosis.results.instruments import sensors_and_inputs_of
 from diagnosis.results.locations import locations_of
 from diagnosis.results.mean_loss import mean_loss_of
-from diagnosis.results.notes import baseline_notes, limit_notes, ratio_notes
+from diagnosis.results.notes import air_notes, baseline_notes, limit_notes, ratio_notes
 from diagnosis.results.predicted_run import PredictedRun
 from diagnosis.results.predictions import PredictingModel
 from diagnosis.results.result import Diagnosis, Verdict
@@ -158,7 +158,8 @@ def assemble(
         as_stated_K=predicting.as_stated_K,
         inputs=_provenance(setup),
         notes=(
-            *ratio_notes(final), *limit_notes(final), *baseline_notes(experiment, posterior, valid.answers),
+            *air_notes(experiment), *ratio_notes(final), *limit_notes(final),
+            *baseline_notes(experiment, posterior, valid.answers),
             *_notes_of_recordings(setup),
         ),
         kinds={kind: posterior.of(kind) for kind in KINDS},

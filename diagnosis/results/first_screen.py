@@ -216,6 +216,10 @@ def _what(d: Diagnosis) -> tuple[str, ...]:
         lines.append(f"No name is certain enough to be reported; most like: {told}.")
         if d.verdict == "parameter_error":
             lines.append("Several may be off, or the definition lacks a part or a path.")
+    elif d.hints:
+        told = ", ".join(f"{named(one.mechanism, one.place)} ({one.log_bayes:.0f} nat"
+                         f"{f'; {date_told(one.date)}' if one.date else ''})" for one in d.hints)  # fmt: skip
+        lines.append(f"Not shown by these data, but ahead of all other names: {told}.")
     elif not d.findings and d.verdict not in NO_CLAIM and not _cannot_be_fitted(d):
         lines.append(f"No name of the catalogue stands out: none has a probability of {NEAREST:g}.")
     return tuple(lines)

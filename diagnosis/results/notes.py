@@ -14,9 +14,12 @@ from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.scale import scale_direction
 from diagnosis.engine.scan import scan, scope_of
 from diagnosis.engine.sessions import sessions_apart
+from diagnosis.recordings.cold_start import is_isothermal
+from diagnosis.setup.start import ambient_at_start, first_readings
 from models.quantities.units import behind_a_number
 
 NOTED_FROM = 5.0  # nats
+AIR_OFF_K, FEWEST_ALIKE = 2.0, 3  # of the air, from so many thermometers that agree
 AT_LIMIT = 1e-6  # of a value, from a limit
 LITTLE = 0.01  # of what the recordings know about the sizes one by one: a small part of fixed capacity pretends so much
 
@@ -57,6 +60,26 @@ def baseline_notes(experiment: Experiment, posterior: Posterior, answers: Sequen
         yield (
             f"A baseline, in which nothing changed, seems to show {ahead.name} as well: {ahead.less:.0f} nat of it "
             "(for as many hours as are tested) do not count. If it may have changed there, leave the session out."
+        )
+
+
+def air_notes(experiment: Experiment) -> Iterator[str]:
+    """One sentence if in every recording that begins cold and at rest the machine is off the recorded air alike."""
+    model = experiment.machine.model
+    if "T_ambient" not in model.laws.inputs:
+        return
+    off = []
+    for piece in experiment.pieces:
+        firsts, air = [*first_readings(model, piece).values()], ambient_at_start(model, piece)
+        if piece.time[0] == 0.0 and len(firsts) >= FEWEST_ALIKE and is_isothermal(firsts, air):
+            off.append(float(np.median(firsts)) - air)
+    if len(off) > 1 and min(map(abs, off)) > AIR_OFF_K and np.ptp(np.sign(off)) == 0.0:
+        low, high = sorted(map(abs, (min(off), max(off))))
+        yield (
+            f"In all {len(off)} recordings that begin with one temperature everywhere this is {low:.1f} to {high:.1f} "
+            f"K {'above' if off[0] > 0.0 else 'below'} the recorded air: the air is another one at the gearbox, the "
+            "probe is wrong, or something next to it keeps it so. How far the probe may be off is its bias_sd in a "
+            "mapping."
         )
 
 

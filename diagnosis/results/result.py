@@ -14,7 +14,9 @@ from diagnosis.results.first_screen import first_screen_of, verdict_text_of
 from diagnosis.results.joint_estimate import JointEstimate
 from diagnosis.results.predicted_run import PredictedRun
 from diagnosis.results.result_parts import (
+    HINT_NAT,
     MODELS,
+    MOST_HINTS,
     MOST_NEAREST,
     NEAREST,
     NO_CLAIM,
@@ -288,6 +290,17 @@ class Diagnosis:
     def further_helps(self) -> bool:
         """True if the recordings give evidence of a further effect; without, its probability is only a prior one."""
         return self.remaining_nat > self.further_threshold
+
+    @property
+    def hints(self) -> tuple[Ranked, ...]:
+        """Names with the most evidence, at their best places, where nothing was detected and none has enough."""
+        if self.findings or self.verdict not in NO_CLAIM or not self.location:
+            return ()
+        best: dict[tuple[str, ...], Ranked] = {}
+        for one in sorted(self.ranking, key=lambda one: -one.log_bayes):
+            if len(one.laws) == 1 and one.log_bayes >= HINT_NAT:
+                best.setdefault(one.laws, one)
+        return tuple(best.values())[:MOST_HINTS]
 
     @property
     def nearest(self) -> tuple[Ranked, ...]:

@@ -19,6 +19,7 @@ NO_CLAIM = ("consistent", "insufficient_data")  # verdicts
 LEAST_RIVAL = 0.01  # probability of what is told as a rival
 MOST_NEAREST = 3  # names that are told of those that were not reported
 NEAREST = 0.1  # their probability at least
+MOST_HINTS, HINT_NAT = 2, 10.0  # names that are told where nothing was detected; evidence of each at least
 # Models that are compared by their predictions, as people call them.
 MODELS: Mapping[str, str] = {"before": "as delivered", "calibrated": "calibrated", "after": "corrected"}
 

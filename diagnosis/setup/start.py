@@ -25,7 +25,7 @@ def start_guess(model: NetworkOnGrid, piece: Piece) -> Array:
 
     A part without a reading is where its links hold it between its neighbours and the surroundings, losses left out.
     """
-    first, ambient = _first_readings(model, piece), _ambient(model, piece)
+    first, ambient = first_readings(model, piece), ambient_at_start(model, piece)
     if is_isothermal([*first.values()], ambient):
         return np.full(model.n, float(np.median([*first.values()])))
     middle = float(np.mean([*first.values()])) if first else ambient
@@ -47,7 +47,7 @@ def start_guess(model: NetworkOnGrid, piece: Piece) -> Array:
 
 def start_covariance(model: NetworkOnGrid, piece: Piece) -> Array:
     """Covariance of the start temperatures about :func:`start_guess`, shape (parts, parts), [K^2]."""
-    first, ambient = _first_readings(model, piece), _ambient(model, piece)
+    first, ambient = first_readings(model, piece), ambient_at_start(model, piece)
     if is_isothermal([*first.values()], ambient):
         apart = ISOTHERMAL_K + ISOTHERMAL_SHARE * abs(float(np.median([*first.values()])) - ambient)
         return np.asarray(apart**2 * np.eye(model.n) + MEASURED_K**2)
@@ -55,7 +55,7 @@ def start_covariance(model: NetworkOnGrid, piece: Piece) -> Array:
     return np.diag([(MEASURED_K if name in first else unmeasured) ** 2 for name in model.parts])
 
 
-def _first_readings(model: NetworkOnGrid, piece: Piece) -> Mapping[str, float]:
+def first_readings(model: NetworkOnGrid, piece: Piece) -> Mapping[str, float]:
     """The first reading of every part that is measured, [degC]."""
     first: dict[str, float] = {}
     for index, name in enumerate(piece.channels):
@@ -66,6 +66,7 @@ def _first_readings(model: NetworkOnGrid, piece: Piece) -> Mapping[str, float]:
     return first
 
 
-def _ambient(model: NetworkOnGrid, piece: Piece) -> float:
+def ambient_at_start(model: NetworkOnGrid, piece: Piece) -> float:
+    """Temperature of the air in the first interval; 20 degC where no input is that, [degC]."""
     inputs = model.laws.inputs
     return float(piece.inputs[0, inputs.index("T_ambient")]) if "T_ambient" in inputs else 20.0

@@ -52,6 +52,9 @@ DOUBTS: dict[str, tuple[pd.DataFrame, str]] = {
     "loss in kW": (table().assign(P_loss_W=0.3),
                    "P_loss_W is 0.3 W on average, but speed_rpm and torque_Nm give 1.48e+04 W"),
     "a wrong thermometer": (with_thermometer(25.0), "T_bearing_2_degC begins 2.5 K above the other thermometers"),
+    "a torque meter's zero": (table().assign(speed_rpm=np.where(NUMBERS < 300, 1500.0, 0.0),
+                                             torque_Nm=np.where(NUMBERS < 300, 86.0, -8.0)),
+                              "torque_Nm is -8 N m in the rows at rest: if nothing loads the shaft there"),
     "minutes": (table().assign(time_s=TIME / 60.0), "time_s goes over 66.5 s, in which T_oil_degC moves by"),
     "hours": (table().assign(time_s=TIME / 3600.0), "if it counts minutes or hours, name its unit in a mapping"),
     "milliseconds": (table().assign(time_s=1e3 * NUMBERS), "if it counts milliseconds"),
@@ -73,6 +76,7 @@ def test_a_doubt_is_the_first_note(tmp_path: Path, fzg: Gearbox, case: str) -> N
     table().assign(T_oil_degC=51.0 + NUMBERS / 100.0, T_pinion_degC=52.0 + NUMBERS / 100.0),  # begun warm, in cool air
     with_thermometer(23.0), with_thermometer(45.0),  # 1 K off; preheated
     table().assign(torque_Nm=1.0), table().assign(torque_Nm=0.0),  # without load
+    table().assign(speed_rpm=np.where(NUMBERS < 300, 1500.0, 0.0)),  # clamped
 ])  # fmt: skip
 def test_a_sound_recording_raises_none(tmp_path: Path, fzg: Gearbox, source: pd.DataFrame) -> None:
     assert all("was not recorded" in note for note in notes(tmp_path, fzg, source))

@@ -12,8 +12,11 @@ import pytest
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.answer import Answer
 from diagnosis.decision.posterior import Assumed, Judged, Placebo
+from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.results import notes
 from diagnosis.results.notes import limit_notes
+from models.assembly.gearbox import Gearbox
+from tests.unit.diagnosis.inference_example import recorded
 from tests.unit.diagnosis.results.assembled_example import Prepared, posterior_of
 
 
@@ -35,6 +38,21 @@ def noted(
         return tuple(notes.baseline_notes(replace(experiment, healthy=frozenset({"april"})), posterior, answers))
 
     return notes_of
+
+
+@pytest.mark.parametrize(
+    ("air_degC", "read"), [((19.0, 18.6), "3.0 to 3.4 K above"), ((19.0, 22.0), ""), ((21.0, 21.0), "")]
+)
+def test_air_that_no_cold_machine_has_is_noted(fzg: Gearbox, air_degC: tuple[float, float], read: str) -> None:
+    """A machine that has not been at rest for long enough is off in some recordings alone."""
+    made = [recorded(fzg, name, hours=0.5) for name in ("monday", "tuesday")]
+    recordings = [
+        replace(one, inputs={**one.inputs, "T_ambient": np.full(len(one.time), air)})
+        for one, air in zip(made, air_degC, strict=True)
+    ]
+    _, experiment = prepare_experiment(fzg, recordings)
+    told = list(notes.air_notes(experiment))
+    assert len(told) == bool(read) and all(read in note for note in told)
 
 
 def test_an_effect_that_acts_in_the_baselines_is_noted(noted: Callable[..., tuple[str, ...]]) -> None:
