@@ -364,8 +364,7 @@ def _calibrated(
     found = {p.name for term in terms for p in term.parameters}
     usual = [one.parameter for one in fit.experiment.unknowns if one.parameter.name in {*stated} - found]
     values = estimates_of(fit)
-    believed = at_stated_size(believed)
-    estimates = {**values, **estimates_of(believed)}
+    estimates = {**values, **estimates_of(at_stated_size(believed))}
     sensors, true_inputs = sensors_and_inputs_of(fit, findings=[term.label for term in terms], inputs=inputs)
     return CalibratedModel(
         calibration=tuple(

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from diagnosis.engine.fit import Fit
-from diagnosis.engine.mean_loss import is_estimated, mean_loss, mean_loss_slopes
+from diagnosis.engine.mean_loss import is_estimated, mean_loss_at_stated_size
 from diagnosis.engine.predict import Prediction
 from models.correction.correction import MeanLoss
 
@@ -31,7 +31,7 @@ def mean_loss_of(
     experiment = believed.experiment
     if not is_estimated(experiment):
         return None
-    slopes = mean_loss_slopes(believed)
+    estimate, error = mean_loss_at_stated_size(believed)
     is_loss = fit.experiment.machine.model.is_loss
 
     def mean_over(runs: Sequence[Prediction]) -> float:
@@ -43,6 +43,6 @@ def mean_loss_of(
         return float(np.average(loss, weights=np.concatenate([one.piece.steps for one in tested])))
 
     return MeanLoss(
-        estimate_W=mean_loss(believed), stderr_W=float(np.sqrt(slopes @ believed.covariance @ slopes)),
+        estimate_W=estimate, stderr_W=error,
         predicting_W=mean_over(run), delivered_W=mean_over(delivered),
     )  # fmt: skip
