@@ -53,7 +53,7 @@ def test_a_machine_weighs_what_its_definition_states(fzg: Gearbox) -> None:
         return float(model.capacities(values).sum() / stated)
 
     z, covariance = by_weight(fit)
-    assert weight(fit.z) < 0.85 < weight(z) < 1.02
+    assert 0.6 < weight(fit.z) < weight(z) - 0.05 < 0.95
     assert np.trace(covariance) < np.trace(fit.covariance) and np.linalg.eigvalsh(covariance).min() > 0.0
     there, error = mean_loss_at_stated_size(fit)
     assert there == pytest.approx(mean_loss(fit) * weight(z) / weight(fit.z), rel=0.1)
