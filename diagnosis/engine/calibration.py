@@ -286,7 +286,7 @@ def _calibrated(experiment: Experiment, error: ModelError, start: Fit) -> Calibr
 def _from_middles(calibration: Calibration) -> Calibration:
     """The calibration, or a more probable one that is reached from the middles of the priors, if it is far from them.
 
-    A few steps do not tell yet which start is better.
+    A few steps do not show yet which start is better.
     """
     if not calibration.is_far:
         return calibration

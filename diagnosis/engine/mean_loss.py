@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from diagnosis.engine.fit import Experiment, Fit
-from diagnosis.engine.scale import all_sizes_are_unknown, by_weight, is_of_temperatures
+from diagnosis.engine.scale import all_sizes_are_unknown, is_of_temperatures
 from diagnosis.engine.unknown import in_scope
 from models.base.types import Array
 
@@ -21,14 +21,6 @@ def mean_loss(fit: Fit) -> float:
     is_loss, tested = fit.experiment.machine.model.is_loss, [fit.parts[i].point for i in fit.experiment.tested]
     heat = sum(float(p.trajectory.piece.steps @ p.balance.sources[:, is_loss].sum(axis=-1)) for p in tested)
     return heat / sum(float(p.trajectory.piece.steps.sum()) for p in tested)
-
-
-def mean_loss_at_stated_size(fit: Fit) -> tuple[float, float]:
-    """Mean total loss and its standard error by :func:`diagnosis.engine.scale.by_weight`, [W]."""
-    z, covariance = by_weight(fit)
-    loss, slopes = mean_loss(fit), mean_loss_slopes(fit)
-    there = loss * float(np.exp(slopes @ (z - fit.z) / loss))  # losses are products of factors
-    return there, float(np.sqrt(slopes @ covariance @ slopes))
 
 
 def mean_loss_slopes(fit: Fit) -> Array:

@@ -19,8 +19,6 @@ from models.network.laws import symbol
 from models.quantities.quantities import is_total_loss
 from models.simulation.thermal_network import ThermalNetwork
 
-STEP = 1e-3  # of an unknown, of a derivative
-
 
 def scale_direction(network: ThermalNetwork, unknowns: Sequence[Unknown]) -> Array:
     """Change of the unknowns that multiplies every heat, conductance and capacity by e.
@@ -46,47 +44,14 @@ def is_of_temperatures(experiment: Experiment) -> bool:
 def at_stated_size(fit: Fit) -> Fit:
     """A fit with the common factor as the definition has it, where temperatures do not know it.
 
-    Model error, whose size is stated in watts, may have moved it: it is larger in a smaller machine. Where the
-    definition fixes some sizes, the machine weighs what it states, see :func:`by_weight`.
+    Model error, whose size is stated in watts, may have moved it: it is larger in a smaller machine.
     """
     experiment = fit.experiment
     network = experiment.machine.model.network
-    if not is_of_temperatures(experiment):
+    if not (is_of_temperatures(experiment) and all_sizes_are_unknown(network, experiment.unknowns)):
         return fit
-    if not all_sizes_are_unknown(network, experiment.unknowns):
-        return replace(fit, z=np.clip(by_weight(fit)[0], *experiment.bounds))
     direction = scale_direction(network, experiment.unknowns)
     return replace(fit, z=fit.z - direction * float(fit.z @ direction) / float(direction @ direction))
-
-
-def by_weight(fit: Fit) -> tuple[Array, Array]:
-    """Most probable unknowns, and their covariance, if all heat capacities together are what the definition states.
-
-    Single capacities have more room than the definition gives them, because one temperature represents a body that has
-    many; how heavy the machine is as a whole is known all the same. Temperatures alone tell heat over capacity: with
-    capacities that are all too small, losses and conductances are too small. The posterior is conditioned on the sum of
-    the capacities, whose logarithm is as uncertain as if the stated errors of all had one sign.
-
-    Returns
-    -------
-    z : Array, shape (unknowns,)
-    covariance : Array, shape (unknowns, unknowns)
-    """
-    machine, covariance = fit.experiment.machine, fit.covariance
-    model, values = machine.model, fit.parts[0].point.setting.values
-    total, stated = float(model.capacities(values).sum()), float(model.capacities(model.start).sum())
-    slopes, sd = np.zeros(len(fit.z)), 0.0
-    for index, unknown in enumerate(fit.experiment.unknowns):
-        if isinstance(unknown, NetworkParameter):
-            at, moved = machine.parameter_index[unknown.parameter.name], np.array(values)
-            moved[at] = unknown.value(float(fit.z[index]) + STEP)
-            slopes[index] = float(np.log(model.capacities(moved).sum() / total)) / STEP
-            sd += abs(slopes[index]) * model.network.parameters[at].sd / unknown.parameter.sd
-    if not slopes.any():
-        return fit.z, covariance
-    common = covariance @ slopes
-    gain = common / (float(slopes @ common) + sd**2)
-    return fit.z - gain * np.log(total / stated), covariance - np.outer(gain, common)
 
 
 def all_sizes_are_unknown(network: ThermalNetwork, unknowns: Sequence[Unknown]) -> bool:

@@ -364,7 +364,8 @@ def _calibrated(
     found = {p.name for term in terms for p in term.parameters}
     usual = [one.parameter for one in fit.experiment.unknowns if one.parameter.name in {*stated} - found]
     values = estimates_of(fit)
-    estimates = {**values, **estimates_of(at_stated_size(believed))}
+    believed = at_stated_size(believed)
+    estimates = {**values, **estimates_of(believed)}
     sensors, true_inputs = sensors_and_inputs_of(fit, findings=[term.label for term in terms], inputs=inputs)
     return CalibratedModel(
         calibration=tuple(

@@ -302,8 +302,11 @@ def _how_much_better(d: Diagnosis) -> tuple[str, ...]:
             ". Without a measured loss watts rest on the heat capacities of the definition: a mass that it lacks, as a "
             "bed or a frame, makes them too few (add FILE foundation_conduction)"
         ) if loss.moved else ""  # fmt: skip
+        weighed = "" if loss.by_weight_W is None or abs(loss.by_weight_W - loss.estimate_W) <= loss.stderr_W else (
+            f" ({number(loss.by_weight_W)} W if all heat capacities together are as the definition states)"
+        )  # fmt: skip
         lines.append(
-            f"Mean total loss, not measured: {with_error(loss.estimate_W, loss.stderr_W)} W estimated, "
+            f"Mean total loss, not measured: {with_error(loss.estimate_W, loss.stderr_W)} W estimated{weighed}, "
             f"{number(loss.delivered_W)} W as delivered, {number(loss.predicting_W)} W in the model that predicts"
             f"{apart}"
         )

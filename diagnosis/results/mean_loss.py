@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from diagnosis.engine.fit import Fit
-from diagnosis.engine.mean_loss import is_estimated, mean_loss_at_stated_size
+from diagnosis.engine.mean_loss import is_estimated, mean_loss, mean_loss_slopes
 from diagnosis.engine.predict import Prediction
 from models.correction.correction import MeanLoss
 
@@ -31,7 +31,7 @@ def mean_loss_of(
     experiment = believed.experiment
     if not is_estimated(experiment):
         return None
-    estimate, error = mean_loss_at_stated_size(believed)
+    slopes = mean_loss_slopes(believed)
     is_loss = fit.experiment.machine.model.is_loss
 
     def mean_over(runs: Sequence[Prediction]) -> float:
@@ -42,7 +42,10 @@ def mean_loss_of(
         loss = np.concatenate([each[:, is_loss[: each.shape[1]]].sum(axis=-1) for each in heat])
         return float(np.average(loss, weights=np.concatenate([one.piece.steps for one in tested])))
 
+    model, values = believed.experiment.machine.model, believed.parts[0].point.setting.values
+    weighs = float(model.capacities(values).sum() / model.capacities(model.start).sum())
+    estimate = mean_loss(believed)
     return MeanLoss(
-        estimate_W=estimate, stderr_W=error,
-        predicting_W=mean_over(run), delivered_W=mean_over(delivered),
+        estimate_W=estimate, stderr_W=float(np.sqrt(slopes @ believed.covariance @ slopes)),
+        predicting_W=mean_over(run), delivered_W=mean_over(delivered), by_weight_W=estimate / weighs,
     )  # fmt: skip

@@ -74,12 +74,12 @@ def air_notes(experiment: Experiment) -> Iterator[str]:
         if piece.time[0] == 0.0 and len(firsts) >= FEWEST_ALIKE and is_isothermal(firsts, air):
             off.append(float(np.median(firsts)) - air)
     if len(off) > 1 and min(map(abs, off)) > AIR_OFF_K and np.ptp(np.sign(off)) == 0.0:
-        low, high = sorted(map(abs, (min(off), max(off))))
+        low, high = (f"{abs(value):.1f}" for value in sorted((min(off), max(off)), key=abs))
         yield (
-            f"In all {len(off)} recordings that begin with one temperature everywhere this is {low:.1f} to {high:.1f} "
-            f"K {'above' if off[0] > 0.0 else 'below'} the recorded air: the air is another one at the gearbox, the "
-            "probe is wrong, or something next to it keeps it so. How far the probe may be off is its bias_sd in a "
-            "mapping."
+            f"In all {len(off)} recordings that begin with one temperature everywhere this is "
+            f"{low if low == high else f'{low} to {high}'} K {'above' if off[0] > 0.0 else 'below'} the recorded air: "
+            "the air is another one at the gearbox, the probe is wrong, or something next to it keeps it so. How far "
+            "the probe may be off is its bias_sd in a mapping."
         )
 
 

@@ -64,13 +64,15 @@ class MeanLoss(Section):
 
     `estimate_W` and its standard error are with model error in place, so that the priors of heats, conductances and
     capacities have their say. `predicting_W` is of the model that predicts, where parameters may stand in for model
-    error; `delivered_W` of the machine as its definition has it.
+    error; `delivered_W` of the machine as its definition has it. `by_weight_W` is the estimate if all heat capacities
+    together are what the definition states: temperatures give heat over capacity.
     """
 
     estimate_W: float
     stderr_W: NotNegative
     predicting_W: float
     delivered_W: float
+    by_weight_W: float | None = None
 
     @property
     def is_far(self) -> bool:

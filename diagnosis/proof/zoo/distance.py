@@ -163,7 +163,7 @@ def _wider(unknown: Unknown) -> Unknown:
 
 
 def _per_row(model: NetworkOnGrid, piece: Piece) -> Noise:
-    """The same for every row of every channel, and start temperatures as they are."""
+    """One noise for every row of every channel, and start temperatures as they are."""
     channels = len(piece.channels)
     return Noise(channel_sd=np.full(channels, PER_ROW_K), floor_sd=np.zeros(channels), loss_relative_sd=0.0,
                  heat_sd=np.zeros(model.n), heat_time=1.0, start=SURE_K**2 * np.eye(model.n))  # fmt: skip

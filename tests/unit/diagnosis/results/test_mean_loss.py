@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 
 from diagnosis.engine.fit import calibrate
-from diagnosis.engine.mean_loss import mean_loss, mean_loss_at_stated_size, mean_loss_slopes
+from diagnosis.engine.mean_loss import mean_loss, mean_loss_slopes
 from diagnosis.engine.predict import predict
 from diagnosis.engine.prepare import prepare_experiment
-from diagnosis.engine.scale import by_weight
 from diagnosis.results.mean_loss import mean_loss_of
 from models.assembly.gearbox import Gearbox
-from models.base.types import Array
 from tests.unit.diagnosis.inference_example import recorded
 from tests.unit.diagnosis.results.assembled_example import Prepared
 
@@ -29,35 +27,13 @@ def test_mean_loss_of_temperatures_alone(fzg: Gearbox) -> None:
     true_W = float(np.mean(driven.columns()["P_loss_W"]))
     assert abs(found.estimate_W - true_W) < 2.0 * found.stderr_W < 0.3 * true_W
     assert found.delivered_W == pytest.approx(true_W, rel=0.02) and not found.moved
+    assert found.by_weight_W == pytest.approx(true_W, rel=0.1)
     names = [unknown.parameter.name for unknown in fit.experiment.unknowns]
     mesh, loss = names.index("mesh"), mean_loss(fit)
     moved = fit.z.copy()
     moved[mesh] += 1e-3
     there = fit.experiment.fit(moved, fit.trajectories, iterations=0)
     assert mean_loss(there) - loss == pytest.approx(1e-3 * mean_loss_slopes(fit)[mesh], rel=0.1)
-
-
-def test_a_machine_weighs_what_its_definition_states(fzg: Gearbox) -> None:
-    """Capacities that come out too small together make losses too small; single ones have more room."""
-    light = {f"C_{name}": 0.6 for name in ("housing_lower", "housing_upper", "oil", "shafts", "gears")}
-    made = recorded(fzg, "made", factors=light)
-    fit = calibrate(prepare_experiment(fzg, [made], [made])[1])
-    model, names = fit.experiment.machine.model, fit.experiment.machine.parameter_index
-    stated = model.capacities(model.start).sum()
-
-    def weight(z: Array) -> float:
-        values = fit.parts[0].point.setting.values.copy()
-        for unknown, one in zip(fit.experiment.unknowns, z.tolist(), strict=True):
-            if unknown.parameter.name in names:
-                values[names[unknown.parameter.name]] = unknown.value(one)
-        return float(model.capacities(values).sum() / stated)
-
-    z, covariance = by_weight(fit)
-    assert 0.6 < weight(fit.z) < weight(z) - 0.05 < 0.95
-    assert np.trace(covariance) < np.trace(fit.covariance) and np.linalg.eigvalsh(covariance).min() > 0.0
-    there, error = mean_loss_at_stated_size(fit)
-    assert there == pytest.approx(mean_loss(fit) * weight(z) / weight(fit.z), rel=0.1)
-    assert error < np.sqrt(mean_loss_slopes(fit) @ fit.covariance @ mean_loss_slopes(fit))
 
 
 def test_a_measured_loss_needs_no_estimate(prepared: Prepared) -> None:

@@ -231,12 +231,14 @@ def test_parameters_far_from_their_priors_are_told_the_farthest_first() -> None:
 
 
 def test_a_loss_that_is_not_measured_is_given_with_its_error_and_with_what_predicts() -> None:
-    loss = MeanLoss(estimate_W=449.0, stderr_W=29.0, predicting_W=462.0, delivered_W=480.0)
+    loss = MeanLoss(estimate_W=449.0, stderr_W=29.0, predicting_W=462.0, delivered_W=480.0, by_weight_W=470.0)
+    light = replace(missing_physics(), model=CalibratedModel(mean_loss=loss.model_copy(update={"by_weight_W": 610.0})))
+    assert "449 ± 29 W estimated (610 W if all heat capacities together are as the" in told(light, "How much better?")
     usual = replace(missing_physics(), model=CalibratedModel(mean_loss=loss))
     line = "Mean total loss, not measured: 449 ± 29 W estimated, 480 W as delivered, 462 W in the model that predicts"
     assert line in told(usual, "How much better?").splitlines()
     assert usual.to_dict()["mean_loss"] == {
-        "estimate_W": 449.0, "stderr_W": 29.0, "predicting_W": 462.0, "delivered_W": 480.0
+        "estimate_W": 449.0, "stderr_W": 29.0, "predicting_W": 462.0, "delivered_W": 480.0, "by_weight_W": 470.0
     }  # fmt: skip
     far = replace(usual, model=CalibratedModel(mean_loss=loss.model_copy(update={"predicting_W": 508.0})))
     assert "508 W in the model that predicts: more than its error" in told(far, "How much better?")
