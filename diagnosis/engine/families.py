@@ -42,7 +42,6 @@ DATES = 14  # of a long recording
 LONG = 0.5  # of the longest recording
 SENSOR_SD_K, TOLERANCES = 1.0, 3.0  # of a step of a thermometer: at least, and so many times its tolerance
 RADIATION = "radiation_error"  # the one law of the model that is part of a link
-MOUNTING = "sensor_elsewhere"  # of a thermometer, which is mounted once
 
 
 def candidates_of(setup: InferenceSetup, experiment: Experiment) -> tuple[Hypothesis, ...]:
@@ -101,7 +100,7 @@ def changes(
     The model's own laws, radiation, sensors and inputs may have any course; other mechanisms of the catalogue begin at
     a date. Ageing has a course already.
     """
-    known = [one for one in catalogue if may_change(one) and one.family != AGEING and one.name != MOUNTING]
+    known = [one for one in catalogue if may_change(one) and one.family != AGEING]
     laws = without_repeats([*factors, *known])
     courses = [step(axis), for_a_while(axis), over_hours(axis)]
     return [

@@ -25,7 +25,6 @@ from models.base.types import Array
 from models.quantities.quantities import is_total_loss
 from models.terms.term import Term
 
-WHOLE = 1.0  # strength of what is wholly there or not
 SHAPES_TRIED = 3  # of what has a memory: its set-points may have several optima
 Starts = tuple[tuple[int, float], ...]  # variants and strengths
 
@@ -169,11 +168,11 @@ def _best_shape(candidate: Hypothesis, at: int, a: Array, b: Array, peaks_K: Arr
 
 
 def _further_starts(term: Term, sizes: Array, found: Strengths, best: int) -> Starts:
-    """Every size with the promised sign of a clock's fault; the whole of a share; shapes of what has a memory."""
+    """Every size with the promised sign of a clock's fault; the next best shapes of what has a memory."""
     if len(np.unique(np.abs(sizes))) > 1:  # none looks like another one, scaled
         return tuple((best, float(size * term.strength.sd)) for size in sizes[sizes * found.value[best] > 0.0])
-    if not term.states:  # of a fault that is whole the machine may have taken most, so that little of it is promised
-        return ((best, WHOLE),) if term.strength.upper == WHOLE else ()
+    if not term.states:
+        return ()
     next_best = np.argsort(-found.log_bayes)[:SHAPES_TRIED]
     return tuple((int(i), float(found.value[i])) for i in next_best if i != best)
 

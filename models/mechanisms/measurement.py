@@ -69,18 +69,6 @@ sensor_gain = _sensor(
     experiment="insulate the leads and repeat: the error changes",
 )
 
-sensor_elsewhere = _sensor(
-    "sensor_elsewhere",
-    "shift",
-    places="each thermometer-neighbour",
-    parameters=lambda _: (share("share of the neighbour in the reading; 1: it sits there"),),
-    law=lambda s: s.strength * (s.T_there - s.T_here),
-    says="The sensor sits on a neighbour of the part that it is named after, or feels it ({place}).",
-    reference="mounting: a probe in the wrong hole, a thermowell that ends in the wall; a hypothesis",
-    experiment="look where the sensor sits, or warm that part by hand and see whether the channel moves",
-    signed=False,
-)
-
 sensor_lag = _sensor(
     "sensor_lag",
     "lag",
@@ -208,7 +196,7 @@ ambient_probe_heated = _input(
 )
 
 MECHANISMS = (
-    sensor_bias, sensor_drift, sensor_gain, sensor_elsewhere, sensor_lag, sensor_stuck, swapped_channels, clock_offset,
+    sensor_bias, sensor_drift, sensor_gain, sensor_lag, sensor_stuck, swapped_channels, clock_offset,
     clock_drift, torque_offset, torque_gain, speed_gain, ambient_probe_offset, ambient_probe_heated,
     ambient_follows_outdoor,
 )  # fmt: skip

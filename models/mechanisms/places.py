@@ -12,8 +12,7 @@ A pattern is a name, a group (its members together), or ``each`` and a group (on
   links that change with them, ``churning+oil-gears``
 - link_factor: links by their ends. ``oil-housing``, ``each bearings-housing``, ``oil-gears+oil-housing``
 - signal: an input. ``torque``
-- sensor: measured channels. ``each sensor`` (temperatures and total loss), ``each thermometer``, that with each part
-  that shares a link with its node, ``each thermometer-neighbour``, ``clock``, ``pair``
+- sensor: measured channels. ``each sensor`` (temperatures and total loss), ``each thermometer``, ``clock``, ``pair``
 
 A pattern that a network has no part of gives no place.
 """
@@ -23,7 +22,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations, permutations, product
+from itertools import combinations
 
 from models.network.laws import symbol
 from models.quantities.quantities import node_of_channel
@@ -213,10 +212,6 @@ def _channels(network: ThermalNetwork, pattern: str, channels: Sequence[str]) ->
     elif pattern == "pair":
         for pair in combinations(nodes, 2):
             yield Placement(name="_".join(pair), target=pair, here=(at[pair[0]],), there=(at[pair[1]],))
-    elif pattern == "each thermometer-neighbour":
-        for name, (node, other) in product(nodes, permutations([part.name for part in network.parts], 2)):
-            if node == at[name] and any({node, other} == set(link.nodes) for link in network.links):
-                yield Placement(name=f"{name}_on_{other}", target=(name,), here=(node,), there=(other,))
     else:
         chosen = nodes if pattern == "each thermometer" else channels
         for name in chosen:

@@ -351,16 +351,6 @@ def test_channels_limit_the_faults_of_sensors() -> None:
     assert targets("clock_offset") == [("oil", "pinion"), channels]  # the loss may be on the clock of the inputs
 
 
-def test_a_thermometer_may_sit_on_a_neighbour() -> None:
-    """On every part that shares a link with its own, measured or not."""
-    found = CATALOGUE["sensor_elsewhere"].placed(NETWORKS["fzg"], SCALES["fzg"], ("shaft_1", "P_loss"))
-    assert [(term.place, term.target) for term in found] == [
-        (f"shaft_1_on_{other}", ("shaft_1",)) for other in ("bearing_1", "bearing_2", "pinion")
-    ]
-    (label,) = (p.name for p in found[2].parameters)
-    assert found[2].expression.equals(symbol(label) * (symbol("T_pinion") - symbol("T_shaft_1")))
-
-
 def test_no_place_in_a_network_without_the_part() -> None:
     network = NETWORKS["fzg"]
     bare = replace(network, sources=tuple(s for s in network.sources if not s.name.startswith("seal")))
