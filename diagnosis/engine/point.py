@@ -116,16 +116,10 @@ class Setting:
             read = fault.distorted(trajectory, self.sensors, read, self.values_of(fault))
         return self._by_clock(trajectory, read)
 
-    def passed_on(self, trajectory: Trajectory, changes: Array, T: Array | None = None) -> Array:
-        """Changes of readings as faulty sensors and clock show them, shape (K + 1, channels, ...).
-
-        Parameters
-        ----------
-        T : Array, shape (K + 1, parts, ...), optional
-            Changes of the temperatures that these come from
-        """
+    def passed_on(self, trajectory: Trajectory, changes: Array) -> Array:
+        """Changes of readings as faulty sensors and clock show them, shape (K + 1, channels, ...)."""
         for fault in self.machine.distortions:
-            changes = fault.passed_on(trajectory, self.sensors, changes, self.values_of(fault), T)
+            changes = fault.passed_on(trajectory, self.sensors, changes, self.values_of(fault))
         return self._by_clock(trajectory, changes)
 
     def _by_clock(self, trajectory: Trajectory, read: Array) -> Array:
@@ -275,7 +269,7 @@ class Point:
         """
         T = self.trajectory.response(into)
         read = reading_columns(self.machine.model, self.trajectory, self.sensors, T, loss)
-        return self.setting.passed_on(self.trajectory, read, T)
+        return self.setting.passed_on(self.trajectory, read)
 
     def responses(self, columns: Sequence[Column]) -> Array:
         """Change of the readings per unit of many columns, in one pass, shape (K + 1, channels, columns)."""

@@ -50,10 +50,6 @@ class TermOnGrid:
         names = {name: f"own_{i}" for i, name in enumerate(own)}
         names |= {f"T_{node}": f"T_place_{i}" for i, node in enumerate(term.target)}
         self._law = _compiled(laws, arguments, names)
-        read = [part for part in model.parts if symbol(f"T_{part}") in laws[0].free_symbols]
-        self._felt = [model.parts.index(part) for part in read] if term.form == "shift" else []
-        slopes = [laws[0].diff(symbol(f"T_{model.parts[index]}")) for index in self._felt]
-        self._slopes = _compiled(slopes, arguments, names) if slopes else None
         self._memories = Memories(term.states, [*given, *own], model.parts, model.boundary)
         heard = {f"T_{part.name}" for part in network.parts} | {f"P_{c}" for c in network.components}
         heard |= {s.name for s in network.states}
@@ -76,12 +72,6 @@ class TermOnGrid:
         -------
         law, temperature : Array, shape (V, K) or (V, K + 1)
         """
-        law, other = self._law(*self._arguments_along(trajectory, values, at_points=at_points))
-        size = (len(values), len(trajectory.T) - (not at_points))
-        return np.broadcast_to(np.asarray(law, float), size), np.broadcast_to(np.asarray(other, float), size)
-
-    def _arguments_along(self, trajectory: Trajectory, values: Array, *, at_points: bool) -> list[Array]:
-        """Arguments of the laws: signals, own parameters, own memories."""
         model, piece = self.model, trajectory.piece
         if at_points:
             inputs, T, time = to_points(piece.inputs), trajectory.T, piece.time
@@ -92,7 +82,10 @@ class TermOnGrid:
             power = losses_along(model, trajectory)
         rows = self._rows(time, inputs, T, trajectory.values, memory, power)
         own = [values[:, index, None] for index in range(values.shape[1])]
-        return [*rows, *own, *self._memories.follow(piece, [*rows, *own], trajectory.seen)]
+        states = self._memories.follow(piece, [*rows, *own], trajectory.seen)
+        law, other = self._law(*rows, *own, *states)
+        size = (len(values), len(T))
+        return np.broadcast_to(np.asarray(law, float), size), np.broadcast_to(np.asarray(other, float), size)
 
     def _rows(self, time: Array, inputs: Array, T: Array, values: Array, memory: Array, power: Array) -> list[Array]:
         """Arguments of the law from the network, without those of the term itself: shape (K,) each."""
@@ -209,26 +202,11 @@ class TermOnGrid:
         """Readings with the fault of a term of kind ``sensor``; `values` of shape (parameters,)."""
         return distorted(self.term, *self._fault(trajectory, values), read, self._channels(sensors))
 
-    def passed_on(
-        self, trajectory: Trajectory, sensors: Sensors, changes: Array, values: Array, T: Array | None = None
-    ) -> Array:  # fmt: skip
-        """Changes of the readings as distorted by such a fault, shape (K + 1, channels, ...).
-
-        Parameters
-        ----------
-        T : Array, shape (K + 1, parts, ...), optional
-            Changes of the temperatures that these come from, which a shift may read
-        """
-        if self.term.form != "shift":
-            return passed_on(self.term, *self._fault(trajectory, values), changes, self._channels(sensors))
-        if self._slopes is None or T is None:
+    def passed_on(self, trajectory: Trajectory, sensors: Sensors, changes: Array, values: Array) -> Array:
+        """Changes of the readings as distorted by such a fault, shape (K + 1, channels, ...); most are linear."""
+        if self.term.form == "shift":
             return changes
-        slopes = self._slopes(*self._arguments_along(trajectory, values[None, :], at_points=True))
-        changes = np.array(changes)
-        for index, slope in zip(self._felt, slopes, strict=True):
-            along = np.broadcast_to(np.asarray(slope, float), (1, len(T)))[0]
-            changes[:, self._channels(sensors)] += (along[:, None] * T[:, index])[:, None]
-        return changes
+        return passed_on(self.term, *self._fault(trajectory, values), changes, self._channels(sensors))
 
     def _fault(self, trajectory: Trajectory, values: Array) -> tuple[Array, Array]:
         """The law, and time, at the grid points."""
