@@ -130,8 +130,8 @@ def _torque_at_rest(found: RecordedRows) -> Iterator[str]:
     if len(rest) < FEWEST_AT_REST:
         return
     low, zero, high = np.quantile(rest, [0.05, 0.5, 0.95])
-    share = abs(zero) / float(np.quantile(np.abs(torque[seen]), USUAL_SHARE))
-    if ZERO_SHARE[0] < share < ZERO_SHARE[1] and high - low < ZERO_SPREAD * abs(zero):
+    least, most = np.array(ZERO_SHARE) * np.quantile(np.abs(torque[seen]), USUAL_SHARE)
+    if least < abs(zero) < most and high - low < ZERO_SPREAD * abs(zero):
         yield (
             f"{found.names['torque']} is {zero:.3g} N m in the rows at rest: if nothing loads the shaft there, that is "
             "the zero of the torque meter, and all other rows are as far off"

@@ -77,6 +77,7 @@ def test_a_doubt_is_the_first_note(tmp_path: Path, fzg: Gearbox, case: str) -> N
     with_thermometer(23.0), with_thermometer(45.0),  # 1 K off; preheated
     table().assign(torque_Nm=1.0), table().assign(torque_Nm=0.0),  # without load
     table().assign(speed_rpm=np.where(NUMBERS < 300, 1500.0, 0.0)),  # clamped
+    table().assign(speed_rpm=0.0, torque_Nm=0.0),
 ])  # fmt: skip
 def test_a_sound_recording_raises_none(tmp_path: Path, fzg: Gearbox, source: pd.DataFrame) -> None:
     assert all("was not recorded" in note for note in notes(tmp_path, fzg, source))
