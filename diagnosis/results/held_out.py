@@ -11,7 +11,7 @@ from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.prepare import held_out_experiment
 from diagnosis.engine.switch_grid import switch_numbers
-from diagnosis.engine.to_predict import loss_by_level, refit_to_predict
+from diagnosis.engine.to_predict import refit_to_predict
 from diagnosis.forward.whitening import RandomHeat
 from diagnosis.results.predictions import PredictingModel, predict_recordings
 from diagnosis.results.result_parts import Fits, Refuted, named
@@ -66,7 +66,7 @@ def validate(
     """
     counting = [name for name in setup.channels if name not in faulty]
     draught = calibration.near.experiment.random_heat.draught
-    held_out = loss_by_level(held_out_experiment(setup, experiment).with_random_heat(RandomHeat(draught=draught)))
+    held_out = held_out_experiment(setup, experiment).with_random_heat(RandomHeat(draught=draught))
 
     def model_with(best: Judged | None) -> PredictingModel:
         return predict_recordings(

@@ -14,7 +14,7 @@ from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.learnt_error import is_writable, with_learnt_error
 from diagnosis.engine.predict import Prediction, log_score_gain, overall_rmse, predict, rmse, with_pieces_of
 from diagnosis.engine.set_apart import without_channels
-from diagnosis.engine.to_predict import instruments_of
+from diagnosis.engine.to_predict import instruments_of, loss_by_level
 from diagnosis.results.result_parts import MODELS, Errors, Fits
 from models.base.types import Array
 from models.quantities.quantities import is_total_loss
@@ -44,7 +44,8 @@ class PredictingModel:
     as_stated_K : float
         Error of the held-out temperatures with instruments as stated instead of as estimated; NaN without any
     holdout_gain : float
-        Log score of it on the held-out readings, less that of the calibrated machine, [nat]
+        Log score of it on the held-out readings, less that of the calibrated machine, [nat]; the better of two, with a
+        measured loss as its meter has it, and no finer than what predicts is calibrated to
     """
 
     best: Judged | None
@@ -116,7 +117,9 @@ def predict_recordings(
     with suppress(ArithmeticError):
         stated = _predictions(_with_stated_instruments(final, best), judged, _courses(after[1]))
         as_stated_K = overall_rmse(stated, columns)
-    gain = log_score_gain(final, plain, without_channels(judged, faulty), runs)
+    sound = without_channels(judged, faulty)
+    # A measured loss takes nothing back by less than what predicts can follow it.
+    gain = max(log_score_gain(final, plain, one, runs) for one in (sound, loss_by_level(sound)))
     return PredictingModel(
         best=best, final=final, learnt=learnt, left_out_K=left_out_K, train_runs=train, holdout_runs=holdout,
         train=_fits(channels, train, counting), holdout=_fits(channels, holdout, counting),

@@ -3,8 +3,8 @@
 A pattern is a name, a group (its members together), or ``each`` and a group (one place per member), by kind:
 
 - source, link: nodes. ``oil``, ``housing``, ``each bearings``, ``each parts`` (of all there are), ``each others`` (a
-  base frame or a tank: those of no group that are not inside); of a link also both ends, ``each bearings-returns``, the
-  other one a boundary or a group of one
+  base frame or a tank: those of no group, where there are groups, that are not inside); of a link also both ends,
+  ``each bearings-returns``, the other one a boundary or a group of one
 - loss_factor: sources. ``losses``, all that are mechanical; ``mesh_sliding``, where there are several stages that of
   all, and that of each; the losses in a group of nodes,
   ``each bearings``; those in the nodes of a group that hang on one member of another, ``each shafts>bearings``; those
@@ -102,7 +102,7 @@ def _members(network: ThermalNetwork, name: str) -> tuple[str, ...]:
         return tuple(part.name for part in network.parts)
     if name == OTHERS:
         grouped = {*INSIDE, *(member for members in network.groups.values() for member in members)}
-        return tuple(part.name for part in network.parts if part.name not in grouped)
+        return tuple(part.name for part in network.parts if network.groups and part.name not in grouped)
     return network.groups.get(name, (name,) if name in network.node_names else ())
 
 

@@ -152,7 +152,7 @@ def test_held_out_readings_are_judged_in_the_draughts_of_the_machine(
 
     def gain(_: Fit, __: Fit, held_out: Experiment, ___: object) -> float:
         judged_in.append(held_out.noise[0])
-        return 0.0
+        return -1.0 if len(judged_in) % 2 else 0.0
 
     monkeypatch.setattr(predictions, "log_score_gain", gain)
     for draught in (0.0, 0.03):
@@ -160,8 +160,11 @@ def test_held_out_readings_are_judged_in_the_draughts_of_the_machine(
         found = assemble(setup, experiment, posterior_of(plain, windage), [], plain=plain,
                          calibration=replace(calibration, near=there))  # fmt: skip
         assert ("draughts of 3 % of all of it" in found.floor) is (draught > 0.0)
-    still, draughty = judged_in
+        assert found.holdout_gain == 0.0  # with a measured loss no finer than what predicts is calibrated to
+    still, coarse, draughty, _ = judged_in
     assert (still.draught, draughty.draught) == (0.0, 0.03)
+    coarser = coarse.channel_sd > still.channel_sd
+    assert [name for name, one in zip(setup.channels, coarser, strict=True) if one] in ([], ["P_loss"])
     np.testing.assert_array_equal(draughty.heat_sd, still.heat_sd)  # as assumed
 
 
