@@ -243,7 +243,7 @@ def changing(
                       date=next((p.name for p in added if p.name == f"{label}_since"), None))  # fmt: skip
 
 
-def carried_on(placed: Placed, axis: Axis) -> Hypothesis:
+def carried_on(placed: Placed, axis: Axis, *, ending: str = CARRIED_ON) -> Hypothesis:
     """A law of the time since the start of the first recording, instead of every recording.
 
     Parameters
@@ -251,7 +251,7 @@ def carried_on(placed: Placed, axis: Axis) -> Hypothesis:
     placed : Placed
         Without memories
     """
-    label = f"{placed.label}_{CARRIED_ON}"
+    label = f"{placed.label}_{ending}"
     term, clock, base = _renamed(placed, label), axis.clock(label), hypothesis_of(placed)
     now = {symbol("time"): symbol("time") + symbol(clock.name)}
     other = term.boundary_temperature
@@ -263,7 +263,7 @@ def carried_on(placed: Placed, axis: Axis) -> Hypothesis:
         parameters=(*term.parameters, clock),
     )  # fmt: skip
     variants = np.column_stack([base.variants, np.full(len(base.variants), clock.start)])
-    return replace(base, term=term, variants=variants, how="carried_on", ending=CARRIED_ON, clock=clock.name)
+    return replace(base, term=term, variants=variants, how="carried_on", ending=ending, clock=clock.name)
 
 
 def comes_daily(placed: Placed) -> bool:
@@ -281,30 +281,25 @@ def each_day(placed: Placed, axis: Axis) -> Hypothesis:
     axis : Axis
         With the hour of the day at which it begins
     """
-    label = f"{placed.label}_{EACH_DAY}"
-    term, clock = _renamed(placed, label), axis.clock(label)
-    mechanism = placed.mechanism
 
-    def daily(law: sp.Expr, noon: sp.Symbol, start: sp.Symbol) -> sp.Expr:
-        now = (symbol("time") + start) / HOUR_S + axis.hour
+    def daily(law: sp.Expr, noon: sp.Symbol) -> sp.Expr:
+        now = symbol("time") / HOUR_S + axis.hour
         away = sp.Mod(now - noon + HOURS_OF_DAY / 2.0, HOURS_OF_DAY) - HOURS_OF_DAY / 2.0
         return law.xreplace({symbol("time"): HOUR_S * (noon + away), noon: HOUR_S * noon})
 
+    noon, length, mechanism = f"{placed.label}_{NOON}", f"{placed.label}_{LENGTH}", placed.mechanism
     of_day = {
-        f"{label}_{NOON}": plain(NOON, HOURS_OF_DAY / 2.0, sd=HOURS_OF_DAY / 3.0, lower=-HOURS_OF_DAY,
-                                 upper=2.0 * HOURS_OF_DAY, unit="h", grid=NOONS_H),
-        f"{label}_{LENGTH}": positive(LENGTH, LENGTHS_S[-1], sd=0.8, unit="s", grid=LENGTHS_S),
+        noon: plain(NOON, HOURS_OF_DAY / 2.0, sd=HOURS_OF_DAY / 3.0, lower=-HOURS_OF_DAY, upper=2.0 * HOURS_OF_DAY,
+                    unit="h", grid=NOONS_H),
+        length: positive(LENGTH, LENGTHS_S[-1], sd=0.8, unit="s", grid=LENGTHS_S),
     }  # fmt: skip
-    parameters = tuple(replace(of_day.get(p.name, p), name=p.name) for p in term.parameters)
-    term = replace(
-        term, expression=daily(term.expression, symbol(f"{label}_{NOON}"), symbol(clock.name)), parameters=parameters,
-        written={key: daily(law, symbol(NOON), symbol(START)) for key, law in term.written.items()},
+    law = replace(
+        placed, expression=daily(placed.expression, symbol(noon)),
+        written={key: daily(law, symbol(NOON)) for key, law in placed.written.items()},
+        parameters=tuple(replace(of_day.get(p.name, p), name=p.name) for p in placed.parameters),
         mechanism=replace(mechanism, says=f"Every day at one hour: {mechanism.says[:1].lower()}{mechanism.says[1:]}"),
     )  # fmt: skip
-    base = hypothesis_of(term)
-    variants = np.column_stack([base.variants, np.full(len(base.variants), clock.start)])
-    return replace(base, term=replace(term, parameters=(*parameters, clock)), variants=variants, how="carried_on",
-                   ending=EACH_DAY, clock=clock.name)  # fmt: skip
+    return carried_on(law, axis, ending=EACH_DAY)
 
 
 def _renamed(placed: Placed, label: str) -> Placed:

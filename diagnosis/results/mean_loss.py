@@ -42,6 +42,7 @@ def mean_loss_of(
         loss = np.concatenate([each[:, is_loss[: each.shape[1]]].sum(axis=-1) for each in heat])
         return float(np.average(loss, weights=np.concatenate([one.piece.steps for one in tested])))
 
+    # Temperatures give heat over capacity, so that losses go with the sum of the capacities.
     model, values = believed.experiment.machine.model, believed.parts[0].point.setting.values
     weighs = float(model.capacities(values).sum() / model.capacities(model.start).sum())
     estimate = mean_loss(believed)

@@ -1,4 +1,6 @@
-"""Notes: baselines with the effect or of another machine, unknowns at limits, recordings that identify ratios only."""
+"""Notes: baselines with the effect or of another machine, air that no cold machine has, unknowns at limits, recordings
+that identify ratios only.
+"""
 
 from __future__ import annotations
 

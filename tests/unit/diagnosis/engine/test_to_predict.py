@@ -15,7 +15,7 @@ from diagnosis.engine.mean_loss import mean_loss, mean_loss_slopes
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.refit import refit
 from diagnosis.engine.scan import scan
-from diagnosis.engine.to_predict import calibrated_to_predict, refit_to_predict
+from diagnosis.engine.to_predict import calibrated_to_predict, loss_by_level, refit_to_predict
 from diagnosis.forward.whitening import AS_ASSUMED
 from diagnosis.recordings.read import read_recordings
 from models.assembly.gearbox import Gearbox, load_gearbox
@@ -177,3 +177,17 @@ def test_numbers_of_a_finding_stay_unless_temperatures_need_others(fzg: Gearbox,
     wrong[len(with_windage.z)] *= 10.0
     needed = refit_to_predict(found.experiment.fit(wrong, iterations=0), with_windage)
     assert needed.z[len(with_windage.z)] < 0.5 * wrong[len(with_windage.z)]
+
+
+def test_a_held_out_loss_is_judged_no_finer_than_it_is_followed(with_windage: Fit) -> None:
+    """An hour of it is one reading, 5 % off; thermometers stay as they are."""
+    experiment = with_windage.experiment
+    known, coarse = experiment.noise[0], loss_by_level(experiment).noise[0]
+    (piece,) = experiment.pieces
+    of_loss = piece.channels.index("P_loss")
+    rows, hours = piece.counts[:, of_loss].sum(), piece.steps.sum() / 3600.0
+    level = np.nanmean(piece.measured[:, of_loss])
+    assert coarse.channel_sd[of_loss] == pytest.approx(0.05 * level * np.sqrt(rows / hours), rel=1e-6)
+    assert coarse.channel_sd[of_loss] > 2.0 * known.channel_sd[of_loss]
+    np.testing.assert_array_equal(np.delete(coarse.channel_sd, of_loss), np.delete(known.channel_sd, of_loss))
+    np.testing.assert_array_equal(coarse.heat_sd, known.heat_sd)

@@ -299,6 +299,31 @@ def test_a_held_out_recording_that_loses_is_named() -> None:
     assert "alone" not in told(base, "How much better?")
 
 
+def test_names_ahead_are_hints_where_nothing_is_detected() -> None:
+    """Each law once, no pairs, none with little evidence, and only where something may be missing."""
+    base, (place, *_) = consistent(), missing_physics().location
+    first, second, *_ = base.ranking
+    names = (
+        replace(first, laws=("a", "b"), log_bayes=40.0), replace(first, log_bayes=30.4),
+        replace(first, place="elsewhere", log_bayes=20.0), replace(second, log_bayes=10.1),
+        replace(second, laws=("other",), log_bayes=9.9),
+    )  # fmt: skip
+    line = "Not shown by these data, but ahead of all other names: pump_heat at oil (30 nat), aeration at oil_gears (10 nat)."
+    asked = replace(base, ranking=names, location=(place,))
+    assert told(asked, "What?") == line
+    assert not replace(asked, location=()).hints and not replace(asked, ranking=names[-1:]).hints
+    assert not replace(asked, verdict="missing_physics").hints
+
+
+def test_a_fault_of_many_channels_names_the_first_two() -> None:
+    base = missing_physics()
+    place = replace(
+        base.location[0], nodes=("oil", "wheel", "pinion", "cover", "base"), heat_mean_W=0.0, heat_max_W=0.0
+    )
+    asked = replace(base, verdict="sensor_fault", location=(place,))
+    assert "oil, wheel and 3 more (" in told(asked, "Where?")
+
+
 def test_a_held_out_recording_of_a_machine_that_changed_is_no_agreement() -> None:
     base = consistent()
     assert base.missed == () and "missed" not in told(base, "How much better?")
