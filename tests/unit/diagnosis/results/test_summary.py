@@ -308,9 +308,9 @@ def test_names_ahead_are_hints_where_nothing_is_detected() -> None:
         replace(first, place="elsewhere", log_bayes=20.0), replace(second, log_bayes=10.1),
         replace(second, laws=("other",), log_bayes=9.9),
     )  # fmt: skip
-    line = "Not shown by these data, but ahead of all other names: pump_heat at oil (30 nat), aeration at oil_gears (10 nat)."
+    hints = "pump_heat at oil (30 nat), aeration at oil_gears (10 nat)"
     asked = replace(base, ranking=names, location=(place,))
-    assert told(asked, "What?") == line
+    assert told(asked, "What?") == f"Not shown by these data, but ahead of all other names: {hints}."
     assert not replace(asked, location=()).hints and not replace(asked, ranking=names[-1:]).hints
     assert not replace(asked, verdict="missing_physics").hints
 
