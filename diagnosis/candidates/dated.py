@@ -20,7 +20,7 @@ from diagnosis.candidates.hypotheses import How, Hypothesis, hypothesis_of, law_
 from models.base.types import Array
 from models.formulas.extremes import Max, Min
 from models.mechanisms import Placed
-from models.mechanisms.forms import EDGE_S, plain, positive, steps
+from models.mechanisms.forms import EDGE_S, MOMENTS, plain, positive, steps
 from models.network.laws import Parameter, symbol
 
 HOUR_S = 3600.0
@@ -251,7 +251,12 @@ def carried_on(placed: Placed, axis: Axis, *, ending: str = CARRIED_ON) -> Hypot
     placed : Placed
         Without memories
     """
-    label = f"{placed.label}_{ending}"
+    label, dates = f"{placed.label}_{ending}", tuple(axis.dates.tolist())
+    if ending == CARRIED_ON and dates:
+        moments = {f"{placed.label}_{name}" for name in MOMENTS}
+        placed = replace(placed, parameters=tuple(
+            replace(axis.moment(p.name), grid=dates) if p.name in moments else p for p in placed.parameters
+        ))  # fmt: skip
     term, clock, base = _renamed(placed, label), axis.clock(label), hypothesis_of(placed)
     now = {symbol("time"): symbol("time") + symbol(clock.name)}
     other = term.boundary_temperature
@@ -263,7 +268,9 @@ def carried_on(placed: Placed, axis: Axis, *, ending: str = CARRIED_ON) -> Hypot
         parameters=(*term.parameters, clock),
     )  # fmt: skip
     variants = np.column_stack([base.variants, np.full(len(base.variants), clock.start)])
-    return replace(base, term=term, variants=variants, how="carried_on", ending=ending, clock=clock.name)
+    begins = f"{label}_{MOMENTS[0]}"
+    return replace(base, term=term, variants=variants, how="carried_on", ending=ending, clock=clock.name,
+                   date=begins if begins in {p.name for p in term.parameters} else None)  # fmt: skip
 
 
 def comes_daily(placed: Placed) -> bool:

@@ -106,6 +106,11 @@ class Hypothesis:
         return self.term is not None and (self.term.of_measurement or self.term.kind == "sensor")
 
     @property
+    def has_course(self) -> bool:
+        """True if its law is multiplied by a course in time that begins at a date."""
+        return self.how == "from_date" and self.date is not None
+
+    @property
     def holds_a_reading(self) -> bool:
         """True if a reading stands still by it."""
         return self.term is not None and self.term.form == "stuck"

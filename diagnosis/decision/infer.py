@@ -183,11 +183,11 @@ def _raced(
         if one.fit is not None:
             judged[one.label] = _fitted_on(calibration, one)
     best = max((judged[one.label] for one in ahead), key=WEIGHT, default=None)
-    if best is not None and best.fit is not None and best.effects[0].date is not None:
+    if best is not None and best.fit is not None and best.effects[0].has_course:
         progress(f"fitting what may have begun instead of {best.label}")
         for one in (judged[one.label] for one in ahead):
             first = one.effects[0]
-            if one.fit and one is not best and first.date and first.ending == best.effects[0].ending:
+            if one.fit and one is not best and first.has_course and first.ending == best.effects[0].ending:
                 judged[one.label] = max(one, _with_course_of(calibration, best, one), key=WEIGHT)
     return judged
 

@@ -38,8 +38,6 @@ def page(diagnosis: Diagnosis) -> str:
         with_error=numbers.with_error,
         drawn=equation.drawn,
     )
-    terms = (*diagnosis.shapes, *(finding.term for finding in diagnosis.findings if finding.term is not None))
-    known = (*diagnosis.network.parameters, *(p for term in terms for p in term.parameters))
     farthest_first = sorted(diagnosis.calibration, key=lambda one: -abs(one.shift_in_sd))
     return environment.from_string(_text("report.html.j2")).render(
         d=diagnosis,
@@ -56,7 +54,7 @@ def page(diagnosis: Diagnosis) -> str:
               for title, fits in (("Held out", diagnosis.holdout), ("Learned from", diagnosis.train))],
         learnt=sorted((term.strength for term in diagnosis.learnt), key=lambda size: -size.start)[:MOST_LEARNT],
         calibration=farthest_first,
-        descriptions={p.name: p.description for p in known},
+        descriptions=diagnosis.descriptions,
         shift_bar=_shift_bar,
         ranking=diagnosis.ranking[:MOST_RANKS],
         shown_ranks=SHOWN_RANKS,

@@ -9,7 +9,7 @@ from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.places import node_in
 from diagnosis.results.result import Verdict
-from diagnosis.results.result_parts import Calibrated, Finding, Location, NotDetectable
+from diagnosis.results.result_parts import NO_CLAIM, Calibrated, Finding, Location, NotDetectable, Ranked
 from diagnosis.setup.inference_setup import InferenceSetup
 from models.quantities.quantities import is_total_loss, node_of_channel
 
@@ -58,7 +58,8 @@ def data_sheet(recordings: Sequence[Recording], calibration: Sequence[Calibrated
 
 def next_test(
     setup: InferenceSetup, verdict: Verdict, findings: Sequence[Finding], location: Sequence[Location],
-    unseen: Sequence[NotDetectable], *, calibration: Sequence[Calibrated], missed: Sequence[str],
+    unseen: Sequence[NotDetectable], *, hints: Sequence[Ranked], calibration: Sequence[Calibrated],
+    missed: Sequence[str],
 ) -> str:  # fmt: skip
     """The next measurement; empty if there is nothing to ask for.
 
@@ -66,6 +67,8 @@ def next_test(
     ----------
     location : sequence of Location
         Most probable first
+    hints : sequence of Ranked
+        Names ahead of all others, most evidence first
     calibration : sequence of Calibrated
         Parameters of the machine and its instruments
     missed : sequence of str
@@ -87,11 +90,22 @@ def next_test(
     for place in location[1:]:
         if place.probability >= OTHER_PLACE and place.node in free:
             return f"a temperature sensor at {place.node.replace('_', ' ')}: it shows if the heat is there"
-    if verdict in ("consistent", "insufficient_data") and unseen:
-        wanted, shown = Counter(one.needed for one in unseen).most_common(1)[0]
-        return f"{wanted} (it would show {shown} effect{'s' if shown > 1 else ''} that these data cannot)"
+    if verdict in NO_CLAIM:
+        return _for_more(setup, hints, unseen)
     if verdict == "unexplained":
         return "repeat the operation in which the model is wrong, and change one input at a time"
     if findings and findings[0].mechanism in setup.catalogue:
         return setup.catalogue[findings[0].mechanism].experiment
     return ""
+
+
+def _for_more(setup: InferenceSetup, hints: Sequence[Ranked], unseen: Sequence[NotDetectable]) -> str:
+    """The experiment where nothing was detected: of the name ahead of all others, or of most that cannot be seen."""
+    ahead = [hint.laws[0] for hint in hints if hint.laws[0] in setup.catalogue]
+    if ahead:
+        return f"{setup.catalogue[ahead[0]].experiment} (it would show {ahead[0]}, which is ahead of all other names)"
+    if not unseen:
+        return ""
+    wanted = Counter(one.needed for one in unseen).most_common(1)[0][0]
+    shown = " and ".join(one.mechanism for one in unseen if one.needed == wanted)
+    return f"{wanted} (it would show {shown}, which these data cannot)"

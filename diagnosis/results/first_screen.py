@@ -46,12 +46,13 @@ LIKELY_TEXT: Mapping[str, str] = {  # of the same verdicts where no name is a cl
 EITHER = "The measurement is at fault, or the model leaves out physics: these data do not separate the two."
 ODD = 1.8  # times the error of the others, from which a recording that was learnt from is another one
 MISSED = "What was learnt from agrees with the model; held-out {names} not."
+FAR = "No effect stands out, but parameters had to go far from what was expected."
 UNFIT = "The model cannot be brought to fit these recordings, and why has no name."
 SIZES = {0.5: "half as large", 1.0: "as assumed", 2.0: "twice as large"}  # of model error, by factor
 MOST_FAR = 3  # parameters far from their priors that the summary tells of
 MOST_UNSEEN = 6  # effects that the summary names of those that cannot be seen
 MOST_TOGETHER = 3  # parts of one place that are all named
-OF_DATE = ("since", "lasting")  # parameters that the date contains
+OF_DATE = ("since", "lasting", "moment")  # parameters that the date contains
 OF_SWITCH = ("set_point", "band")  # parameters that the switching temperatures contain
 LONG_S = 7200.0  # times beyond are told in hours
 LITTLE_SPREAD = 0.05  # deviation between sessions that is not worth a word, in prior standard deviations
@@ -63,6 +64,8 @@ def verdict_text_of(d: Diagnosis) -> str:
         return UNFIT
     if d.verdict == "consistent" and d.missed:
         return MISSED.format(names=f"{', '.join(d.missed)} {'does' if len(d.missed) == 1 else 'do'}")
+    if d.verdict == "consistent" and _far(d):
+        return FAR
     if d.verdict == "unexplained" and any(f.family != OPEN_FORM for f in d.findings):
         return PARTLY
     if any(finding.grade == "claim" for finding in d.findings):
@@ -222,7 +225,23 @@ def _what(d: Diagnosis) -> tuple[str, ...]:
         lines.append(f"Not shown by these data, but ahead of all other names: {told}.")
     elif not d.findings and d.verdict not in NO_CLAIM and not _cannot_be_fitted(d):
         lines.append(f"No name of the catalogue stands out: none has a probability of {NEAREST:g}.")
+    lines += _far(d) if d.verdict in NO_CLAIM else ()
     return tuple(lines)
+
+
+def _far(d: Diagnosis) -> list[str]:
+    """Parameters far from their priors; where no effect was found, what to make of them."""
+    far = sorted((c for c in d.calibration if c.is_far), key=lambda c: -abs(c.shift_in_sd))
+    if not far:
+        return []
+    deviations = {p.name for p in d.network.parameters if p.start == 0.0}  # from what the definition assumes
+    told = []
+    for c in far[:MOST_FAR]:
+        what = "; ".join(filter(None, (d.descriptions.get(c.parameter), f"{abs(c.shift_in_sd):.1f} sd")))
+        way = "off by" if c.parameter in deviations else "="
+        told.append(f"{c.parameter} {way} {c.estimate:.3g}{behind_a_number(c.unit)} ({what})")
+    use = ": check what they rest on, or whether a part or a path is missing" if d.verdict in NO_CLAIM else ""
+    return [f"Far from what was expected: {', '.join(told)}{use}."]
 
 
 def _how_sure(d: Diagnosis) -> tuple[str, ...]:
@@ -248,12 +267,7 @@ def _how_sure(d: Diagnosis) -> tuple[str, ...]:
         known = ", ".join(d.known.summary()["findings"]) or "calibrated values"
         lines.append(f"Known before, and part of the model as delivered: {known}.")
     lines += _assumed_told(d)
-    far = sorted((c for c in d.calibration if c.is_far), key=lambda c: -abs(c.shift_in_sd))
-    if far:
-        deviations = {p.name for p in d.network.parameters if p.start == 0.0}  # from what the definition assumes
-        told = [f"{c.parameter} {'off by' if c.parameter in deviations else '='} {c.estimate:.3g}"
-                f"{behind_a_number(c.unit)} ({abs(c.shift_in_sd):.1f} sd)" for c in far[:MOST_FAR]]  # fmt: skip
-        lines.append(f"Far from what was expected: {', '.join(told)}.")
+    lines += () if d.verdict in NO_CLAIM else _far(d)
     if d.remaining_note:
         lines.append(f"Remaining: {d.remaining_note}")
     return tuple(lines)
@@ -302,8 +316,8 @@ def _how_much_better(d: Diagnosis) -> tuple[str, ...]:
             ". Without a measured loss watts rest on the heat capacities of the definition: a mass that it lacks, as a "
             "bed or a frame, makes them too few (add FILE foundation_conduction)"
         ) if loss.moved else ""  # fmt: skip
-        weighed = "" if loss.by_weight_W is None or abs(loss.by_weight_W - loss.estimate_W) <= loss.stderr_W else (
-            f" ({number(loss.by_weight_W)} W if all heat capacities together are as the definition states)"
+        weighed = "" if loss.other_by_weight_W is None else (
+            f" ({number(loss.other_by_weight_W)} W if all heat capacities together are as the definition states)"
         )  # fmt: skip
         lines.append(
             f"Mean total loss, not measured: {with_error(loss.estimate_W, loss.stderr_W)} W estimated{weighed}, "
@@ -398,7 +412,7 @@ def _cannot_be_seen(d: Diagnosis) -> tuple[str, ...]:
 
 def values_told(finding: Finding) -> str:
     """Numbers of a finding for a terminal."""
-    told_else = OF_DATE if finding.switching is None else (*OF_DATE, *OF_SWITCH)
+    told_else = (*_of_date(finding), *(OF_SWITCH if finding.switching is not None else ()))
     values = [(p.name, p.value, p.stderr, p.unit) for p in finding.parameters if p.name not in told_else]
     if finding.heat_mean_W > 0.0:
         values.append(("mean |heat|", finding.heat_mean_W, finding.heat_stderr_W, "W"))
@@ -411,13 +425,17 @@ def values_told(finding: Finding) -> str:
     return ", ".join(told)
 
 
+def _of_date(finding: Finding) -> tuple[str, ...]:
+    return () if finding.date is None else OF_DATE
+
+
 def predicting_told(d: Diagnosis, finding: Finding) -> str:
     """Numbers of a finding that are far from the estimate in the model that predicts, and so in the FMU."""
     term = next((one for one in d.terms if finding.term is not None and one.label == finding.term.label), None)
     if term is None:
         return ""
     there = {p.name.removeprefix(f"{term.label}_"): p.start for p in term.parameters}
-    both = [(p, there[p.name]) for p in finding.parameters if p.name in there and p.name not in OF_DATE]
+    both = [(p, there[p.name]) for p in finding.parameters if p.name in there and p.name not in _of_date(finding)]
     told = [f"{p.name} = {number(value)}{behind_a_number(p.unit)}" for p, value in both
             if 0.0 < FAR_SD * p.stderr < abs(value - p.value)]  # fmt: skip
     return f"in the model that predicts (correction.toml): {', '.join(told)}" if told else ""

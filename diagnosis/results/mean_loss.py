@@ -46,7 +46,10 @@ def mean_loss_of(
     model, values = believed.experiment.machine.model, believed.parts[0].point.setting.values
     weighs = float(model.capacities(values).sum() / model.capacities(model.start).sum())
     estimate = mean_loss(believed)
+    by_weight = estimate / weighs
+    # A prior that this machine violates draws all heats with it, by more than the curvature knows of.
+    stderr = np.hypot(np.sqrt(slopes @ believed.covariance @ slopes), by_weight - estimate)
     return MeanLoss(
-        estimate_W=estimate, stderr_W=float(np.sqrt(slopes @ believed.covariance @ slopes)),
-        predicting_W=mean_over(run), delivered_W=mean_over(delivered), by_weight_W=estimate / weighs,
+        estimate_W=estimate, stderr_W=float(stderr), predicting_W=mean_over(run), delivered_W=mean_over(delivered),
+        by_weight_W=by_weight,
     )  # fmt: skip

@@ -14,9 +14,7 @@ from diagnosis.results.first_screen import first_screen_of, verdict_text_of
 from diagnosis.results.joint_estimate import JointEstimate
 from diagnosis.results.predicted_run import PredictedRun
 from diagnosis.results.result_parts import (
-    HINT_NAT,
     MODELS,
-    MOST_HINTS,
     MOST_NEAREST,
     NEAREST,
     NO_CLAIM,
@@ -29,6 +27,7 @@ from diagnosis.results.result_parts import (
     Ranked,
     Refuted,
     error_unit,
+    hints_of,
     named,
     or_none,
 )
@@ -292,15 +291,18 @@ class Diagnosis:
         return self.remaining_nat > self.further_threshold
 
     @property
+    def descriptions(self) -> dict[str, str]:
+        """What the parameters of the machine, of the tilts of its laws and of the findings are, by name."""
+        terms = (*self.shapes, *(finding.term for finding in self.findings if finding.term is not None))
+        known = (*self.network.parameters, *(p for term in terms for p in term.parameters))
+        return {p.name: p.description for p in known}
+
+    @property
     def hints(self) -> tuple[Ranked, ...]:
         """Names with the most evidence, at their best places, where nothing was detected and none has enough."""
         if self.findings or self.verdict not in NO_CLAIM or not self.location:
             return ()
-        best: dict[tuple[str, ...], Ranked] = {}
-        for one in sorted(self.ranking, key=lambda one: -one.log_bayes):
-            if len(one.laws) == 1 and one.log_bayes >= HINT_NAT:
-                best.setdefault(one.laws, one)
-        return tuple(best.values())[:MOST_HINTS]
+        return hints_of(self.ranking)
 
     @property
     def nearest(self) -> tuple[Ranked, ...]:

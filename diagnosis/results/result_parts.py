@@ -418,6 +418,15 @@ class Ranked:
     date: Change | None = None
 
 
+def hints_of(ranking: Sequence[Ranked]) -> tuple[Ranked, ...]:
+    """Names with evidence worth a hint, those with most of it, each at its best place."""
+    best: dict[tuple[str, ...], Ranked] = {}
+    for one in sorted(ranking, key=lambda one: -one.log_bayes):
+        if len(one.laws) == 1 and one.log_bayes >= HINT_NAT:
+            best.setdefault(one.laws, one)
+    return tuple(best.values())[:MOST_HINTS]
+
+
 @dataclass(frozen=True, kw_only=True)
 class NotDetectable:
     """An effect that these data could not have shown, and the test that would show it.

@@ -59,7 +59,7 @@ class InferenceSetup:
     white_loss : (float, float)
         White noise of one row of the total loss: a constant part [W] and one relative to the loss [-]
     display : Array, shape (channels,)
-        Rounding error of every display, [K] or [W]; 0 if its step is not known
+        What rounding leaves in a mean of many rows, [K] or [W]; 0 if the step of the display is not known
     """
 
     gearbox: Gearbox
@@ -93,7 +93,7 @@ class InferenceSetup:
     def noise_in(self, piece: Piece) -> Noise:
         """Noise of one piece.
 
-        A display that rounds is off by up to half a step, however many rows are averaged while it stands still.
+        A display that rounds is off by up to half a step, however many rows are averaged, unless noise moves it.
         """
         noise = noise_of(
             self.model, piece, self.white_K, self.loss_W, loss_noise=self.white_loss,
@@ -141,14 +141,15 @@ def prepare(
     )
     if not holdout:
         learnt, held_out = tuple(map(first_part, learnt)), tuple(map(last_part, learnt))
+    white_K = channel_noise(everything, channels)
+    white_loss = loss_noise(everything) if TOTAL_LOSS in channels else (0.0, 0.0)
     return InferenceSetup(
         gearbox=gearbox, recordings=tuple(recordings), holdout=tuple(holdout), baseline=tuple(baseline),
         switched_off=tuple(switched_off), catalogue=catalogue,
         nominal=nominal, model=model, shapes=shapes, scale=scale, channels=channels,
         learnt=(*learnt, *of_baselines), held_out=held_out, loss_W=typical_loss(model, train),
-        white_K=channel_noise(everything, channels),
-        white_loss=loss_noise(everything) if TOTAL_LOSS in channels else (0.0, 0.0),
-        display=display_noise(everything, channels),
+        white_K=white_K, white_loss=white_loss,
+        display=display_noise(everything, channels, white_K, white_loss[0]),
     )  # fmt: skip
 
 

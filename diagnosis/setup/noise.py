@@ -16,6 +16,7 @@ from models.base.types import Array
 from models.quantities.quantities import is_total_loss
 
 LOWEST_SD_K, LOWEST_SD_W = 0.02, 0.5
+HARMONICS = np.arange(1, 51)  # of the error of rounding
 FEWEST_ROWS, DEFAULT_LOSS_RELATIVE = 50, 0.02
 HEAT_FRACTION = 0.005  # random heat in every part, of the typical total loss
 HEAT_TIME_S = 1200.0
@@ -74,10 +75,44 @@ def channel_noise(recordings: Sequence[Recording], channels: Sequence[str]) -> M
     return result
 
 
-def display_noise(recordings: Sequence[Recording], channels: Sequence[str]) -> Array:
-    """Standard deviation of the coarsest rounding of a display, shape (channels,), [K] or [W]; 0 if none is known."""
+def display_noise(
+    recordings: Sequence[Recording], channels: Sequence[str], white: Mapping[str, float], loss_W: float
+) -> Array:  # fmt: skip
+    """Standard deviation of what rounding leaves in a mean of many rows, shape (channels,), [K] or [W].
+
+    Of the coarsest display of every channel; 0 if none is known. Noise of half a step and more lets the mean read
+    between the steps.
+
+    Parameters
+    ----------
+    white : mapping of str to float
+        Noise of one row of every temperature, rounding included, [K]
+    loss_W : float
+        The same of the total loss, [W]
+    """
     steps = [[c.resolution or 0.0 for r in recordings for c in r.channels if c.name == name] for name in channels]
-    return np.asarray([max(found, default=0.0) for found in steps]) / float(np.sqrt(12.0))
+    coarsest = [max(found, default=0.0) for found in steps]
+    return np.array([left_by_rounding(step, white.get(name, loss_W))
+                     for name, step in zip(channels, coarsest, strict=True)])  # fmt: skip
+
+
+def left_by_rounding(step: float, sd: float) -> float:
+    """Standard deviation of the error of the mean of many rounded readings of one value.
+
+    The mean error of a value x is the Fourier series of the error of rounding, every harmonic k multiplied by the
+    characteristic function of the noise, exp(-2 (pi k noise / step)^2) (Widrow, Kollar, Quantization Noise (2008),
+    chapter 19). Without noise it is that of rounding, step / sqrt(12).
+
+    Parameters
+    ----------
+    sd : float
+        Of one reading, rounding included
+    """
+    if step == 0.0:
+        return 0.0
+    noise = np.sqrt(max(sd * sd - step * step / 12.0, 0.0)) / step
+    powers = np.exp(-np.square(2.0 * np.pi * HARMONICS * noise)) / (2.0 * np.square(np.pi * HARMONICS))
+    return step * float(np.sqrt(powers.sum()))
 
 
 def noise_of(

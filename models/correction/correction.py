@@ -65,7 +65,8 @@ class MeanLoss(Section):
     `estimate_W` and its standard error are with model error in place, so that the priors of heats, conductances and
     capacities have their say. `predicting_W` is of the model that predicts, where parameters may stand in for model
     error; `delivered_W` of the machine as its definition has it. `by_weight_W` is the estimate if all heat capacities
-    together are what the definition states: temperatures give heat over capacity.
+    together are what the definition states: temperatures give heat over capacity. The error contains its difference
+    from the estimate.
     """
 
     estimate_W: float
@@ -78,6 +79,12 @@ class MeanLoss(Section):
     def is_far(self) -> bool:
         """True if the model that predicts is not to be asked for losses."""
         return self._is_far(self.predicting_W)
+
+    @property
+    def other_by_weight_W(self) -> float | None:
+        """The loss of the stated weight, if it makes up most of the error."""
+        apart = self.by_weight_W is not None and 2.0 * abs(self.by_weight_W - self.estimate_W) > self.stderr_W
+        return self.by_weight_W if apart else None
 
     @property
     def moved(self) -> bool:

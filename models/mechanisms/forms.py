@@ -13,6 +13,7 @@ from models.network.laws import Parameter
 
 LARGEST = 100.0  # strength, in standard deviations of its prior
 SMALLEST_FACTOR = -0.95  # of a relative change: a loss or conductance never turns round
+MOMENTS = ("moment", "noon", "onset")  # names of moments
 DURING = (0.01, 0.03, 0.08, 0.2, 0.4, 0.55, 0.7, 0.85)  # of a recording: where a search for a moment starts
 RUNNING = 20.0  # sharpness of what begins with the shafts: from about a tenth of the reference speed it is all there
 ONCE = 6.0  # durations of a recording, after which what happened once would come again
@@ -91,8 +92,8 @@ def temperature(
     return plain(name, start, sd=sd, lower=lower, upper=upper, unit="degC", grid=grid)
 
 
-def moment(scale: Scale, name: str = "moment") -> Parameter:
-    """A moment within a recording, [s] since its start."""
+def moment(scale: Scale, name: str = MOMENTS[0]) -> Parameter:
+    """A moment within a recording, [s] since its start; by one of the names :data:`MOMENTS`."""
     d = scale.duration
     grid = [share * d for share in DURING]
     return plain(name, 0.4 * d, sd=0.3 * d, lower=-d, upper=3.0 * d, unit="s", grid=grid)

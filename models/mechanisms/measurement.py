@@ -12,7 +12,7 @@ from models.terms.term import Form
 FAMILY = "measurement"
 DAY_S = 86400.0
 EXCHANGE = "exchange the sensor with another one and repeat: a fault of the sensor goes with it"
-EQUAL_TEMPERATURE = "hold a second thermometer next to it, or let all rest for a night: all must agree then"
+EQUAL_TEMPERATURE = "hold a second thermometer next to each, or let all rest for a night: all must agree then"
 
 
 def _sensor(

@@ -27,7 +27,7 @@ FAMILY = "surroundings"
 HOUR_S = 3600.0
 SWITCHES = 24.0  # sharpness of a switch: from a tenth below a speed to a tenth above it
 WETTED_S = 300.0  # after which a shower has wetted everything
-STANDSTILL_DAY = "leave it at standstill for a day with an ambient probe on each side"
+STANDSTILL_DAY = "leave the machine at standstill for a day with an ambient probe on each side"
 
 solar_soak = Mechanism(
     name="solar_soak",

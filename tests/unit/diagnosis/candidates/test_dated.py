@@ -122,6 +122,20 @@ def test_a_law_of_time_is_carried_on(fzg: Gearbox) -> None:
     assert value(hypothesis.term, 500.0, 4500.0, **own) == pytest.approx(-0.3 * (1 - np.exp(-5.0)))
 
 
+def test_a_moment_of_a_law_that_is_carried_on_lies_on_the_axis_of_all_recordings(fzg: Gearbox) -> None:
+    """Damage on the fifth day is far outside the hours of any recording."""
+    placed = CATALOGUE["bearing_damage"].placed(fzg.network(), Scale.of(fzg))[0]
+    days = Axis(dates=np.array([30_000.0, 380_000.0]), end=400_000.0, until=500_000.0)
+    hypothesis = carried_on(placed, days)
+    assert isinstance(hypothesis.term, Placed)
+    moment = next(p for p in hypothesis.term.parameters if p.name == f"{hypothesis.term.label}_moment")
+    assert set(hypothesis.variants[:, hypothesis.term.parameters.index(moment)]) == {30_000.0, 380_000.0}
+    assert hypothesis.date == moment.name and not hypothesis.has_course
+    assert moment.sd == pytest.approx(0.4 * 400_000.0) and moment.upper == pytest.approx(390_000.0)
+    without_dates = carried_on(placed, replace(days, dates=np.zeros(0)))
+    assert len(without_dates.variants) == len(CATALOGUE["bearing_damage"].parameters(Scale.of(fzg))[1].grid)
+
+
 def test_a_clock_that_drifts_goes_on_in_the_next_recording(fzg: Gearbox) -> None:
     placed = CATALOGUE["clock_drift"].placed(fzg.network(), Scale.of(fzg))[0]
     hypothesis = carried_on(placed, AXIS)

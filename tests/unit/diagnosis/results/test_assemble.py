@@ -348,6 +348,14 @@ def test_nothing(assembled: Assemble, prepared: Prepared, windage: Judged) -> No
     assert assembled(posterior_of(plain, weak, log_e=-1.0, expected=blind), []).verdict == "insufficient_data"
 
 
+def test_where_nothing_is_detected_the_name_ahead_is_to_be_tested(
+    assembled: Assemble, prepared: Prepared, windage: Judged
+) -> None:
+    found = assembled(posterior_of(prepared[2], replace(windage, log_bayes=12.0), log_e=2.0), [])
+    assert found.verdict == "consistent" and [one.mechanism for one in found.hints] == ["windage"]
+    assert found.next_test.startswith(f"{CATALOGUE['windage'].experiment} (it would show windage")
+
+
 def test_where_nothing_is_detected_the_place_is_told_with_a_condition(
     assembled: Assemble, prepared: Prepared, windage: Judged
 ) -> None:

@@ -28,6 +28,10 @@ def test_mean_loss_of_temperatures_alone(fzg: Gearbox) -> None:
     assert abs(found.estimate_W - true_W) < 2.0 * found.stderr_W < 0.3 * true_W
     assert found.delivered_W == pytest.approx(true_W, rel=0.02) and not found.moved
     assert found.by_weight_W == pytest.approx(true_W, rel=0.1)
+    slopes = mean_loss_slopes(fit)
+    of_fit = float(np.sqrt(slopes @ fit.covariance @ slopes))
+    assert found.stderr_W > of_fit
+    assert found.stderr_W == pytest.approx(np.hypot(of_fit, found.by_weight_W - found.estimate_W))
     names = [unknown.parameter.name for unknown in fit.experiment.unknowns]
     mesh, loss = names.index("mesh"), mean_loss(fit)
     moved = fit.z.copy()

@@ -12,7 +12,7 @@ from diagnosis.decision.posterior import Assumed, Placebo, ScaledError
 from diagnosis.decision.settings import Settings
 from diagnosis.report import finding_charts
 from diagnosis.report.page import page
-from diagnosis.results.first_screen import EITHER, VERDICT_TEXT, predicting_told
+from diagnosis.results.first_screen import EITHER, FAR, VERDICT_TEXT, predicting_told
 from diagnosis.results.number_format import number
 from diagnosis.results.result import Diagnosis
 from diagnosis.results.result_parts import CalibratedModel, Change, Errors, Fits, Ranked, Rival, Switching
@@ -222,23 +222,29 @@ def test_parameters_in_a_tie_have_names_of_their_own() -> None:
 
 def test_parameters_far_from_their_priors_are_told_the_farthest_first() -> None:
     usual = consistent()
-    assert "Far from" not in str(usual)  # all within 2.6 sd
+    assert "Far from" not in str(usual) and usual.verdict_text.startswith("Nothing stands out")  # all within 2.6 sd
     seal, bearing, *rest = usual.calibration
     far = (replace(bearing, parameter="bearing", estimate=1.9, shift_in_sd=3.2),
            replace(seal, parameter="seal", estimate=0.319, shift_in_sd=-4.57))  # fmt: skip
-    sure = told(replace(usual, model=CalibratedModel(calibration=(*far, *rest))), "How sure?")
-    assert "Far from what was expected: seal = 0.319 (4.6 sd), bearing = 1.9 (3.2 sd)" in sure
+    moved = replace(usual, model=CalibratedModel(calibration=(*far, *rest)))
+    line = (
+        "Far from what was expected: seal = 0.319 (factor on the seal losses; 4.6 sd), "
+        "bearing = 1.9 (factor on the bearing losses; 3.2 sd)"
+    )
+    assert told(moved, "What?") == f"{line}: check what they rest on, or whether a part or a path is missing."
+    assert moved.verdict_text == FAR
+    assert f"{line}." in told(replace(missing_physics(), model=moved.model), "How sure?")
 
 
 def test_a_loss_that_is_not_measured_is_given_with_its_error_and_with_what_predicts() -> None:
-    loss = MeanLoss(estimate_W=449.0, stderr_W=29.0, predicting_W=462.0, delivered_W=480.0, by_weight_W=470.0)
+    loss = MeanLoss(estimate_W=449.0, stderr_W=29.0, predicting_W=462.0, delivered_W=480.0, by_weight_W=460.0)
     light = replace(missing_physics(), model=CalibratedModel(mean_loss=loss.model_copy(update={"by_weight_W": 610.0})))
     assert "449 ± 29 W estimated (610 W if all heat capacities together are as the" in told(light, "How much better?")
     usual = replace(missing_physics(), model=CalibratedModel(mean_loss=loss))
     line = "Mean total loss, not measured: 449 ± 29 W estimated, 480 W as delivered, 462 W in the model that predicts"
     assert line in told(usual, "How much better?").splitlines()
     assert usual.to_dict()["mean_loss"] == {
-        "estimate_W": 449.0, "stderr_W": 29.0, "predicting_W": 462.0, "delivered_W": 480.0, "by_weight_W": 470.0
+        "estimate_W": 449.0, "stderr_W": 29.0, "predicting_W": 462.0, "delivered_W": 480.0, "by_weight_W": 460.0
     }  # fmt: skip
     far = replace(usual, model=CalibratedModel(mean_loss=loss.model_copy(update={"predicting_W": 508.0})))
     assert "508 W in the model that predicts: more than its error" in told(far, "How much better?")

@@ -9,7 +9,7 @@ import pytest
 
 from diagnosis.forward.grid import Piece
 from diagnosis.forward.network_on_grid import NetworkOnGrid
-from diagnosis.setup.noise import channel_noise, display_noise, loss_noise, noise_of
+from diagnosis.setup.noise import channel_noise, display_noise, left_by_rounding, loss_noise, noise_of
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 from tests.unit.diagnosis.inference_example import CHANNELS, recorded, recording_of
@@ -45,8 +45,20 @@ def test_a_display_is_off_by_up_to_half_its_step(ride: dict[str, Array]) -> None
     stated = tuple(replace(c, resolution=0.5) if c.name == "oil" else c for c in recording.channels)
     tested = replace(recording, channels=stated)
     for every in ([tested], [tested, recording], [recording, tested]):  # one whose step is unknown is no finer one
-        found = display_noise(every, ("oil", "bearing_1", "P_loss"))
-        np.testing.assert_allclose(found, [0.5 / np.sqrt(12.0), 0.0, 0.0])
+        found = display_noise(every, ("oil", "bearing_1", "P_loss"), {"oil": 0.1, "bearing_1": 0.1}, 2.0)
+        np.testing.assert_allclose(found, [0.5 / np.sqrt(12.0), 0.0, 0.0], rtol=0.01)
+    assert display_noise([tested], ("oil",), {"oil": 0.3}, 0.0) < 0.002
+
+
+@pytest.mark.parametrize("noise", [0.05, 0.1, 0.2])
+def test_noise_lets_a_mean_read_between_the_steps_of_a_display(noise: float) -> None:
+    """Against drawn readings, in steps of the display; without noise see the test above."""
+    step, rng = 0.5, np.random.default_rng(1)
+    true = rng.uniform(0.0, step, 2000)
+    read = step * np.round((true[:, None] + noise * rng.standard_normal((2000, 4000))) / step)
+    one = float((read - true[:, None]).std())
+    of_means = np.hypot(left_by_rounding(step, one), one / np.sqrt(4000.0))
+    assert of_means == pytest.approx((read.mean(axis=1) - true).std(), rel=0.05)
 
 
 def test_noise_of_many_short_pieces_is_that_of_all(fzg: Gearbox) -> None:
