@@ -356,4 +356,5 @@ def switching_of(values: Values, effect: Hypothesis) -> Switching | None:
     hot = {s: sp.Float(HOT_DEGC) for s in switch.free_symbols if s.name.startswith("T_")}
     others = {s: sp.Integer(0) for s in switch.free_symbols if s not in known and s not in hot}
     on_when_hot = float(switch.xreplace(known | hot | others)) > 0.5
-    return Switching(on_degC=upper, off_degC=lower) if on_when_hot else Switching(on_degC=lower, off_degC=upper)
+    on, off = (upper, lower) if on_when_hot else (lower, upper)
+    return Switching(on_degC=on, off_degC=off, of=tuple(sorted(s.name.removeprefix("T_") for s in hot)))

@@ -420,8 +420,8 @@ def values_told(finding: Finding) -> str:
         f"{name} = {with_error(value, stderr).replace(MINUS, '-')}{behind_a_number(unit)}"
         for name, value, stderr, unit in values
     ]
-    if finding.switching is not None:
-        told.append(f"on at {finding.switching.on_degC:.1f} degC, off at {finding.switching.off_degC:.1f} degC")
+    if (switch := finding.switching) is not None:
+        told.append(f"on at {switch.on_degC:.1f} degC, off at {switch.off_degC:.1f} degC ({switch.followed})")
     return ", ".join(told)
 
 

@@ -92,10 +92,18 @@ class Switching:
     Attributes
     ----------
     on_degC, off_degC : float
+    of : tuple of str
+        Nodes whose temperature it follows, of several the mean
     """
 
     on_degC: float
     off_degC: float
+    of: tuple[str, ...]
+
+    @property
+    def followed(self) -> str:
+        """What it follows, in words."""
+        return f"{'mean of ' if len(self.of) > 1 else ''}{', '.join(self.of)}"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -30,12 +30,14 @@ def test_a_parameter_that_is_off_by_a_unit_asks_for_the_unit(value: float, state
 
 
 def test_switch_temperatures_are_on_and_off(fzg: Gearbox) -> None:
-    for name, on, off in (("cooler_thermostat", 73.0, 67.0), ("heater_thermostat", 67.0, 73.0)):
+    housing = ("housing_lower", "housing_upper")
+    for name, on, off, of in (("cooler_thermostat", 73.0, 67.0, ("oil",)), ("heater_thermostat", 67.0, 73.0, ("oil",)),
+                              ("fan_thermostat", 73.0, 67.0, housing)):  # fmt: skip
         term, *_ = CATALOGUE[name].placed(fzg.network(), Scale.of(fzg))
         values = {p.name: (p.start, 0.0) for p in term.parameters}
         values |= {f"{term.label}_set_point": (70.0, 1.0), f"{term.label}_band": (6.0, 1.0)}
         found = switching_of(values, hypothesis_of(term))
-        assert found is not None and (found.on_degC, found.off_degC) == (on, off), name
+        assert found is not None and (found.on_degC, found.off_degC, found.of) == (on, off, of), name
 
 
 def test_a_value_beyond_its_bound_keeps_an_error() -> None:

@@ -134,14 +134,14 @@ def test_nearest_names_of_one_kind_at_one_place_are_told_together() -> None:
 def test_dates_and_switches() -> None:
     (finding,) = missing_physics().findings
     change = Change(recording="train_1", from_s=20634.0, band_s=(20100.0, 21100.0))
-    found = replace(finding, date=change, switching=Switching(on_degC=73.0, off_degC=67.0))
+    found = replace(finding, date=change, switching=Switching(on_degC=73.0, off_degC=67.0, of=("oil",)))
     what = told(replace(missing_physics(), findings=(found,)), "What?")
-    assert "on at 73.0 degC, off at 67.0 degC" in what
+    assert "on at 73.0 degC, off at 67.0 degC (oil)" in what
     assert "from 5.73 h of train_1 on (5.58 h to 5.86 h)" in what
     stored = replace(missing_physics(), findings=(found,)).to_dict()["findings"][0]
     assert stored["date"] == {"recording": "train_1", "from_s": 20634.0, "band_s": [20100.0, 21100.0], "to_s": None,
                               "utc": None}  # fmt: skip
-    assert stored["switching"] == {"on_degC": 73.0, "off_degC": 67.0}
+    assert stored["switching"] == {"on_degC": 73.0, "off_degC": 67.0, "of": ("oil",)}
 
 
 def test_numbers_that_are_others_in_the_model_that_predicts_are_told() -> None:
