@@ -292,7 +292,7 @@ class Diagnosis:
 
     @property
     def descriptions(self) -> dict[str, str]:
-        """What the parameters of the machine, of the tilts of its laws and of the findings are, by name."""
+        """Descriptions of the parameters of the machine, of the tilts of its laws and of the findings, by name."""
         terms = (*self.shapes, *(finding.term for finding in self.findings if finding.term is not None))
         known = (*self.network.parameters, *(p for term in terms for p in term.parameters))
         return {p.name: p.description for p in known}

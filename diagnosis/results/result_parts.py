@@ -102,7 +102,7 @@ class Switching:
 
     @property
     def followed(self) -> str:
-        """What it follows, in words."""
+        """Its nodes, in words."""
         return f"{'mean of ' if len(self.of) > 1 else ''}{', '.join(self.of)}"
 
 

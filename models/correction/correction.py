@@ -62,11 +62,9 @@ class Estimate(Section):
 class MeanLoss(Section):
     """``[mean_loss]``: mean total loss of recordings that measure none, in W.
 
-    `estimate_W` and its standard error are with model error in place, so that the priors of heats, conductances and
-    capacities have their say. `predicting_W` is of the model that predicts, where parameters may stand in for model
-    error; `delivered_W` of the machine as its definition has it. `by_weight_W` is the estimate if all heat capacities
-    together are what the definition states: temperatures give heat over capacity. The error contains its difference
-    from the estimate.
+    `estimate_W` has model error in place, so that the priors of heats, conductances and capacities have their say;
+    `by_weight_W` is that with the stated sum of heat capacities, for temperatures give heat over capacity: `stderr_W`
+    contains the difference. `predicting_W` is of the model that predicts, `delivered_W` of the definition.
     """
 
     estimate_W: float
@@ -83,8 +81,8 @@ class MeanLoss(Section):
     @property
     def other_by_weight_W(self) -> float | None:
         """The loss of the stated weight, if it makes up most of the error."""
-        apart = self.by_weight_W is not None and 2.0 * abs(self.by_weight_W - self.estimate_W) > self.stderr_W
-        return self.by_weight_W if apart else None
+        weighed_W = self.by_weight_W
+        return None if weighed_W is None or 2.0 * abs(weighed_W - self.estimate_W) <= self.stderr_W else weighed_W
 
     @property
     def moved(self) -> bool:
