@@ -368,9 +368,13 @@ GENERATORS: Mapping[str, Callable[[], Iterator[str]]] = {
 
 
 class Generated(SphinxDirective):
-    """``{generated} NAME``: the Markdown that a function of this module returns, in place."""
+    """``{generated} NAME``: the Markdown that a function of this module returns, in place of its text.
+
+    The text is for those who read the pages without the site.
+    """
 
     required_arguments = 1
+    has_content = True
 
     def run(self) -> list[Node]:
         """Parse the Markdown."""
