@@ -100,8 +100,8 @@ def left_by_rounding(step: float, sd: float) -> float:
     """Standard deviation of the error of the mean of many rounded readings of one value.
 
     The mean error of a value x is the Fourier series of the error of rounding, every harmonic k multiplied by the
-    characteristic function of the noise, exp(-2 (pi k noise / step)^2) (Widrow, Kollar, Quantization Noise (2008),
-    chapter 19). Without noise it is that of rounding, step / sqrt(12).
+    characteristic function of the noise, exp(-2 (pi k noise / step)^2) (Widrow, Kollar, Quantization Noise (2008), on
+    dither; from memory, checked against drawn readings). Without noise it is that of rounding, step / sqrt(12).
 
     Parameters
     ----------
