@@ -16,7 +16,7 @@ from models.base.types import Array
 from models.quantities.quantities import is_total_loss
 
 LOWEST_SD_K, LOWEST_SD_W = 0.02, 0.5
-HARMONICS = np.arange(1, 51)  # of the error of rounding
+HARMONICS = np.arange(1.0, 51.0)  # of the error of rounding
 FEWEST_ROWS, DEFAULT_LOSS_RELATIVE = 50, 0.02
 HEAT_FRACTION = 0.005  # random heat in every part, of the typical total loss
 HEAT_TIME_S = 1200.0
@@ -111,8 +111,8 @@ def left_by_rounding(step: float, sd: float) -> float:
     if step == 0.0:
         return 0.0
     noise = np.sqrt(max(sd * sd - step * step / 12.0, 0.0)) / step
-    powers = np.exp(-np.square(2.0 * np.pi * HARMONICS * noise)) / (2.0 * np.square(np.pi * HARMONICS))
-    return step * float(np.sqrt(powers.sum()))
+    kept = np.average(np.exp(-np.square(2.0 * np.pi * HARMONICS * noise)), weights=1.0 / HARMONICS**2)
+    return step * float(np.sqrt(kept / 12.0))
 
 
 def noise_of(
