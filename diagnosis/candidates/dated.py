@@ -75,7 +75,8 @@ class Axis:
         """A date as a parameter, [s]: not so late that next to nothing is recorded after it."""
         latest = 0.5 * (self.end + float(self.dates.max(initial=0.0)))
         return Parameter(name=name, unit="s", start=0.5 * self.end, sd=DATE_SD * self.end, lower=-self.end,
-                         upper=latest, log=False)  # fmt: skip
+                         upper=latest, log=False,
+                         description="time since the first row of the first recording")  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -246,10 +247,14 @@ def changing(
 def carried_on(placed: Placed, axis: Axis, *, ending: str = CARRIED_ON) -> Hypothesis:
     """A law of the time since the start of the first recording, instead of every recording.
 
+    Its moments are looked for at the dates of the axis: within a recording's hours they would miss later recordings.
+
     Parameters
     ----------
     placed : Placed
         Without memories
+    ending : str
+        Of its label; a law that comes again every day has an hour of the day in place of a moment
     """
     label, dates = f"{placed.label}_{ending}", tuple(axis.dates.tolist())
     if ending == CARRIED_ON and dates:
