@@ -18,11 +18,14 @@ from diagnosis.engine.unknown import (
     SensorLag,
     Unknown,
 )
-from diagnosis.forward.grid import slow_rows
+from diagnosis.forward.grid import pieces, slow_rows
+from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.recordings.recording import Recording
-from diagnosis.setup.inference_setup import InferenceSetup, prepare
+from diagnosis.setup.inference_setup import InferenceSetup, first_part, last_part, scale_of, typical_loss
+from diagnosis.setup.noise import channel_noise, display_noise, loss_noise
 from diagnosis.setup.sessions import hour_of_start, session_by_recording, start_times
-from diagnosis.setup.shaft import torque_gain
+from diagnosis.setup.shaft import shafts, torque_gain, with_shaft
+from diagnosis.setup.shapes import shape_terms
 from diagnosis.setup.start import start_guess
 from models.assembly.gearbox import Gearbox
 from models.mechanisms import CATALOGUE, Mechanism
@@ -50,19 +53,57 @@ def prepare_experiment(
     catalogue: Mapping[str, Mechanism] = CATALOGUE,
     even: bool = False,
 ) -> tuple[InferenceSetup, Experiment]:
-    """Set up an experiment with the recordings to learn from; see :func:`diagnosis.setup.inference_setup.prepare`."""
-    setup = prepare(gearbox, recordings, holdout, baseline, switched_off=switched_off, catalogue=catalogue, even=even)
+    """Set up the inference and an experiment with the recordings to learn from.
+
+    Parameters
+    ----------
+    holdout : sequence of Recording
+        Without any the last quarter of every stretch without a gap is held out
+    baseline : sequence of Recording
+        To learn from as well, as a whole; they do not decide on the scale
+    switched_off : collection of str
+        See :class:`~diagnosis.setup.inference_setup.InferenceSetup`
+    even : bool
+        True for intervals of one length, see :func:`diagnosis.forward.grid.pieces`
+    """
+    as_defined = gearbox.network()
+    nominal = with_shaft(as_defined)
+    train, held, healthy = (shafts(given, as_defined) for given in (recordings, holdout, baseline))
+    everything = (*train, *healthy)
+    scale = scale_of(gearbox, train)
+    shapes = shape_terms(nominal, scale)
+    network = nominal
+    for term in shapes:
+        network = term.apply(network)
+    model = NetworkOnGrid(network, gearbox.loss_laws())
+    measured = {c.name for r in everything for c in r.channels}
+    temperatures = sorted((c for c in measured if not is_total_loss(c)), key=lambda c: (model.part_index(c), c))
+    channels = (*temperatures, *([TOTAL_LOSS] if TOTAL_LOSS in measured else []))
+    learnt, held_out, of_baselines = (
+        pieces(given, model.laws.inputs, channels, even=even) for given in (train, held, healthy)
+    )
+    if not holdout:
+        learnt, held_out = tuple(map(first_part, learnt)), tuple(map(last_part, learnt))
+    white_K = channel_noise(everything, channels)
+    white_loss = loss_noise(everything) if TOTAL_LOSS in channels else (0.0, 0.0)
+    setup = InferenceSetup(
+        gearbox=gearbox, recordings=tuple(recordings), holdout=tuple(holdout), baseline=tuple(baseline),
+        switched_off=tuple(switched_off), catalogue=catalogue,
+        nominal=nominal, model=model, shapes=shapes, scale=scale, channels=channels,
+        learnt=(*learnt, *of_baselines), held_out=held_out, loss_W=typical_loss(model, train),
+        white_K=white_K, white_loss=white_loss,
+        display=display_noise(everything, channels, white_K, white_loss[0]),
+    )  # fmt: skip
     starts_at = start_times([*recordings, *holdout])
     unknowns = usual_unknowns(
-        setup.model.network, (*recordings, *baseline), setup.channels, interval=setup.scale.interval,
-        gain_of_torque=torque_gain(gearbox.network()),
-    )  # fmt: skip
+        network, (*recordings, *baseline), channels, interval=scale.interval, gain_of_torque=torque_gain(as_defined)
+    )
     return setup, Experiment(
-        machine=Machine(setup.model),
+        machine=Machine(model),
         pieces=setup.learnt,
         unknowns=tuple(unknowns),
         noise=tuple(setup.noise_in(piece) for piece in setup.learnt),
-        starts=tuple(start_guess(setup.model, piece) for piece in setup.learnt),
+        starts=tuple(start_guess(model, piece) for piece in setup.learnt),
         session_of=session_by_recording(recordings, holdout, baseline),
         healthy=frozenset(r.name for r in baseline),
         switched_off=frozenset(switched_off),
@@ -80,12 +121,12 @@ def held_out_experiment(setup: InferenceSetup, experiment: Experiment) -> Experi
     setup : InferenceSetup
         Of the same recordings, see :func:`prepare_experiment`
     """
-    pieces = setup.held_out
+    held_out = setup.held_out
     return replace(
         experiment,
-        pieces=pieces,
-        noise=tuple(setup.noise_in(piece) for piece in pieces),
-        starts=tuple(start_guess(setup.model, piece) for piece in pieces),
+        pieces=held_out,
+        noise=tuple(setup.noise_in(piece) for piece in held_out),
+        starts=tuple(start_guess(setup.model, piece) for piece in held_out),
         filters=None,
         healthy=frozenset(),
     )

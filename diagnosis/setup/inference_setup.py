@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.forward.grid import Piece, pieces
+from diagnosis.forward.grid import Piece
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.whitening import Noise
 from diagnosis.recordings.recording import Recording
-from diagnosis.setup.noise import channel_noise, display_noise, loss_noise, noise_of
-from diagnosis.setup.shaft import shafts, with_shaft
-from diagnosis.setup.shapes import shape_terms
+from diagnosis.setup.noise import noise_of
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 from models.correction.corrected_gearbox import CorrectedGearbox
 from models.correction.correction import Correction
-from models.mechanisms import CATALOGUE, Mechanism, Scale
-from models.quantities.quantities import GEARBOX_INPUTS, TOTAL_LOSS, is_total_loss
+from models.mechanisms import Mechanism, Scale
+from models.quantities.quantities import GEARBOX_INPUTS, is_total_loss
 from models.simulation.thermal_network import ThermalNetwork
 from models.terms.term import Term
 
@@ -91,66 +89,11 @@ class InferenceSetup:
         return float(np.median(list(self.white_K.values()))) if self.white_K else 0.0
 
     def noise_in(self, piece: Piece) -> Noise:
-        """Noise of one piece.
-
-        A display that rounds is off by up to half a step, however many rows are averaged, unless noise moves it.
-        """
-        noise = noise_of(
-            self.model, piece, self.white_K, self.loss_W, loss_noise=self.white_loss,
+        """Noise of one piece."""
+        return noise_of(
+            self.model, piece, self.white_K, self.loss_W, loss_noise=self.white_loss, display=self.display,
             parametric=self.gearbox.is_parametric,
         )  # fmt: skip
-        return replace(noise, floor_sd=np.maximum(noise.floor_sd, self.display))
-
-
-def prepare(
-    gearbox: Gearbox,
-    recordings: Sequence[Recording],
-    holdout: Sequence[Recording],
-    baseline: Sequence[Recording] = (),
-    *,
-    switched_off: Collection[str] = (),
-    catalogue: Mapping[str, Mechanism] = CATALOGUE,
-    even: bool = False,
-) -> InferenceSetup:
-    """Set up the inference; see :class:`InferenceSetup` for what is given.
-
-    Parameters
-    ----------
-    holdout : sequence of Recording
-        Without any the last quarter of every stretch without a gap is held out
-    baseline : sequence of Recording
-        To learn from as well, as a whole; they do not decide on the scale
-    even : bool
-        True for intervals of one length, see :func:`diagnosis.forward.grid.pieces`
-    """
-    as_defined = gearbox.network()
-    nominal = with_shaft(as_defined)
-    train, held, healthy = (shafts(given, as_defined) for given in (recordings, holdout, baseline))
-    everything = (*train, *healthy)
-    scale = scale_of(gearbox, train)
-    shapes = shape_terms(nominal, scale)
-    network = nominal
-    for term in shapes:
-        network = term.apply(network)
-    model = NetworkOnGrid(network, gearbox.loss_laws())
-    measured = {c.name for r in everything for c in r.channels}
-    temperatures = sorted((c for c in measured if not is_total_loss(c)), key=lambda c: (model.part_index(c), c))
-    channels = (*temperatures, *([TOTAL_LOSS] if TOTAL_LOSS in measured else []))
-    learnt, held_out, of_baselines = (
-        pieces(given, model.laws.inputs, channels, even=even) for given in (train, held, healthy)
-    )
-    if not holdout:
-        learnt, held_out = tuple(map(first_part, learnt)), tuple(map(last_part, learnt))
-    white_K = channel_noise(everything, channels)
-    white_loss = loss_noise(everything) if TOTAL_LOSS in channels else (0.0, 0.0)
-    return InferenceSetup(
-        gearbox=gearbox, recordings=tuple(recordings), holdout=tuple(holdout), baseline=tuple(baseline),
-        switched_off=tuple(switched_off), catalogue=catalogue,
-        nominal=nominal, model=model, shapes=shapes, scale=scale, channels=channels,
-        learnt=(*learnt, *of_baselines), held_out=held_out, loss_W=typical_loss(model, train),
-        white_K=white_K, white_loss=white_loss,
-        display=display_noise(everything, channels, white_K, white_loss[0]),
-    )  # fmt: skip
 
 
 def first_part(piece: Piece) -> Piece:

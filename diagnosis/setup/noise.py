@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.optimize import nnls
 
 from diagnosis.forward.grid import Piece, slow_rows, white_sd
@@ -117,7 +118,7 @@ def left_by_rounding(step: float, sd: float) -> float:
 
 def noise_of(
     model: NetworkOnGrid, piece: Piece, white: Mapping[str, float], loss_W: float, *,
-    loss_noise: tuple[float, float] = (0.0, 0.0), parametric: bool = False,
+    loss_noise: tuple[float, float] = (0.0, 0.0), display: ArrayLike = 0.0, parametric: bool = False,
 ) -> Noise:  # fmt: skip
     """The noise of one piece.
 
@@ -129,6 +130,8 @@ def noise_of(
         Typical total loss, [W]
     loss_noise : (float, float)
         Of the measured total loss, see :func:`loss_noise`
+    display : array_like, shape (channels,)
+        What rounding leaves in a mean of many rows, see :func:`display_noise`, [K] or [W]
     parametric : bool
         Whether only the form of the laws is known: the structural floor (random heat in every part) is higher then
     """
@@ -139,7 +142,7 @@ def noise_of(
         heat_sd = np.where(heavy, PARAMETRIC_FRACTION * loss_W, PARAMETRIC_K * _conductances(model, piece))
     return Noise(
         channel_sd=np.array([white.get(name, loss_noise[0]) for name in piece.channels]),
-        floor_sd=np.array([LOWEST_SD_W if is_total_loss(name) else LOWEST_SD_K for name in piece.channels]),
+        floor_sd=np.maximum([LOWEST_SD_W if is_total_loss(one) else LOWEST_SD_K for one in piece.channels], display),
         loss_relative_sd=loss_noise[1],
         heat_sd=heat_sd,
         heat_time=HEAT_TIME_S,

@@ -11,7 +11,7 @@ import pytest
 from diagnosis.engine.fit import calibrate
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.recordings.recording import Channel, Recording
-from diagnosis.setup.inference_setup import HELD_OUT_SHARE, START_S, first_part, last_part, prepare
+from diagnosis.setup.inference_setup import HELD_OUT_SHARE, START_S, first_part, last_part
 from models.assembly.gearbox import Gearbox
 from models.files.cycle import Cycle
 
@@ -59,7 +59,7 @@ def test_readings_held_out_do_not_touch_what_is_learnt(fzg: Gearbox, recordings:
 def test_without_a_held_out_recording_the_last_quarter_is_held_out(
     fzg: Gearbox, recordings: tuple[Recording, Recording]
 ) -> None:
-    case = prepare(fzg, [recordings[0]], [])
+    case, _ = prepare_experiment(fzg, [recordings[0]])
     (learnt,), (judged,) = case.learnt, case.held_out
     time, read = learnt.time, np.isfinite(learnt.measured).all(axis=1)
     late = time > time[0] + (1.0 - HELD_OUT_SHARE) * (time[-1] - time[0])
@@ -72,7 +72,7 @@ def test_without_a_held_out_recording_the_last_quarter_is_held_out(
 
 
 def test_splitting_leaves_the_given_pieces_alone(fzg: Gearbox, recordings: tuple[Recording, Recording]) -> None:
-    whole = prepare(fzg, [recordings[0]], [recordings[1]]).learnt
+    whole = prepare_experiment(fzg, [recordings[0]], [recordings[1]])[0].learnt
     before = whole[0].measured.copy()
     first_part(whole[0]), last_part(whole[0])
     np.testing.assert_array_equal(whole[0].measured, before)
