@@ -16,7 +16,16 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from diagnosis.candidates.hypotheses import How, Hypothesis, hypothesis_of, law_of
+from diagnosis.candidates.hypotheses import (
+    CARRIED_ON,
+    EACH_DAY,
+    HOURS,
+    STEP,
+    WHILE,
+    Hypothesis,
+    hypothesis_of,
+    law_of,
+)
 from models.base.types import Array
 from models.formulas.extremes import Max, Min
 from models.mechanisms import Placed
@@ -27,8 +36,7 @@ HOUR_S = 3600.0
 LINEAR_S, SETTLING_S = 20.0 * HOUR_S, 3.0 * HOUR_S  # of the courses over the hours
 DATE_SD = 0.4  # of the time axis: nearly a uniform prior
 RISES, LENGTHS = (3.0,), (1.5, 4.0)  # of a slow step and of a change for a while, in distances between dates
-STEP, WHILE, HOURS, CARRIED_ON = "step", "for_a_while", "over_hours", "carried_on"  # endings of labels
-EACH_DAY, HOURS_OF_DAY = "each_day", 24.0
+HOURS_OF_DAY = 24.0
 NOON, LENGTH = "noon", "length"  # shapes of a law that comes again at one hour: when it is at its height, how long
 NOONS_H, LENGTHS_S = tuple(np.arange(0.0, HOURS_OF_DAY, 3.0)), (1.0 * HOUR_S, 2.5 * HOUR_S)
 
@@ -87,8 +95,6 @@ class DatedCourse:
     ----------
     ending : str
         Of the name of a law that has it
-    how : str
-        Family of hypotheses
     sentence : str
         Sentence that comes before the one of the law
     parameters : tuple of Parameter
@@ -99,7 +105,6 @@ class DatedCourse:
     """
 
     ending: str
-    how: How
     sentence: str
     parameters: tuple[Parameter, ...]
     variants: Array
@@ -120,7 +125,7 @@ def step(axis: Axis, *, slow: bool = True) -> DatedCourse:
     rises = axis.distance * np.array(RISES)
     at_once, slowly = _products(axis.dates, [axis.edge_s]), _products([0.0, *axis.dates[::2]], rises)
     return DatedCourse(
-        ending=STEP, how="from_date", sentence="From a date on",
+        ending=STEP, sentence="From a date on",
         parameters=(axis.moment("since"), _span("within", axis.edge_s, rises[-1])),
         variants=np.concatenate([at_once, slowly]) if slow else at_once,
         law=Min(Max((NOW - since) / rise, 0), 1),
@@ -132,7 +137,7 @@ def for_a_while(axis: Axis) -> DatedCourse:
     since, length = symbol("since"), symbol("lasting")
     lengths = axis.distance * np.array(LENGTHS)
     return DatedCourse(
-        ending=WHILE, how="from_date", sentence="From one date to another",
+        ending=WHILE, sentence="From one date to another",
         parameters=(axis.moment("since"), _span("lasting", *lengths)), variants=_products(axis.dates[::2], lengths),
         law=steps(NOW, at=since, width=0.5 * axis.edge_s) - steps(NOW, at=since + length, width=0.5 * axis.edge_s),
     )  # fmt: skip
@@ -148,7 +153,7 @@ def in_times(spans: Sequence[tuple[float, float]]) -> DatedCourse:
     """
     times = ", ".join(f"{first / HOUR_S:.2f} to {last / HOUR_S:.2f} h" for first, last in spans)
     return DatedCourse(
-        ending=WHILE, how="from_date", sentence=f"From {times} after the first row of the first recording",
+        ending=WHILE, sentence=f"From {times} after the first row of the first recording",
         parameters=(), variants=np.empty((1, 0)), law=sp.Add(*(_between(first, last) for first, last in spans)),
     )  # fmt: skip
 
@@ -168,7 +173,7 @@ def in_one_of(spans: Sequence[tuple[float, float]]) -> DatedCourse:
         for name, start in zip(("since", "lasting"), variants[0].tolist(), strict=True)
     )
     return DatedCourse(
-        ending=WHILE, how="from_date", sentence="In one recording", parameters=tuple(given), variants=variants,
+        ending=WHILE, sentence="In one recording", parameters=tuple(given), variants=variants,
         law=_between(first, first + lasting),
     )  # fmt: skip
 
@@ -187,7 +192,7 @@ def over_hours(axis: Axis) -> DatedCourse:
     )  # fmt: skip
     decay = sp.exp(-NOW / SETTLING_S)
     return DatedCourse(
-        ending=HOURS, how="over_hours", sentence="Slowly over the hours", parameters=parameters, variants=np.eye(3),
+        ending=HOURS, sentence="Slowly over the hours", parameters=parameters, variants=np.eye(3),
         law=linear * Min(NOW, axis.until) / max(LINEAR_S, axis.end) + settling * (1 - decay) + fading * decay,
     )  # fmt: skip
 
@@ -240,7 +245,7 @@ def changing(
     tried = product(*grids) if every_shape else [tuple(grid[len(grid) // 2] for grid in grids)]
     rows = [[1.0, *shape, *variant, clock.start] for shape in tried for variant in course.variants.tolist()]
     return Hypothesis(name=name, place=placed.place, family=placed.family, term=term, law=law, variants=np.array(rows),
-                      how=course.how, ending=course.ending, clock=clock.name,
+                      ending=course.ending, clock=clock.name,
                       date=next((p.name for p in added if p.name == f"{label}_since"), None))  # fmt: skip
 
 
@@ -274,7 +279,7 @@ def carried_on(placed: Placed, axis: Axis, *, ending: str = CARRIED_ON) -> Hypot
     )  # fmt: skip
     variants = np.column_stack([base.variants, np.full(len(base.variants), clock.start)])
     begins = f"{label}_{MOMENTS[0]}"
-    return replace(base, term=term, variants=variants, how="carried_on", ending=ending, clock=clock.name,
+    return replace(base, term=term, variants=variants, ending=ending, clock=clock.name,
                    date=begins if begins in {p.name for p in term.parameters} else None)  # fmt: skip
 
 

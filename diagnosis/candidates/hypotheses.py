@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Literal
@@ -15,6 +15,11 @@ from models.terms.term import Term
 
 MOST_VARIANTS = 24
 How = Literal["always", "from_date", "carried_on", "over_hours", "parameter"]
+STEP, WHILE, HOURS, CARRIED_ON, EACH_DAY = "step", "for_a_while", "over_hours", "carried_on", "each_day"
+HOW: Mapping[str, How] = {  # a law acts, by what its course in time adds to its label
+    "": "always", STEP: "from_date", WHILE: "from_date", HOURS: "over_hours", CARRIED_ON: "carried_on",
+    EACH_DAY: "carried_on",
+}  # fmt: skip
 CLOCK_SIZES = (-2.0, -1.0, -0.3, 0.3, 1.0, 2.0)  # of the typical one
 
 
@@ -36,10 +41,6 @@ class Hypothesis:
         The mechanism of the catalogue that has this law; None: the catalogue has none
     variants : Array, shape (V, parameters)
         Values of the term's parameters that are tried, the strength 1
-    how : str
-        ``always``: as the law has it; ``from_date``: from a date on, or between two; ``carried_on``: a law of time that
-        goes on in the next recording, or comes again every day; ``over_hours``: slowly; ``parameter``: one outside its
-        prior
     ending : str
         What the course in time adds to the label of the law
     clock : str or None
@@ -62,13 +63,22 @@ class Hypothesis:
     law: str
     known_as: str | None = None
     variants: Array
-    how: How = "always"
     ending: str = ""
     clock: str | None = None
     date: str | None = None
     log_prior: float = 0.0
     less: float = 0.0
     trusted: bool = False
+
+    @property
+    def how(self) -> How:
+        """When it acts.
+
+        ``always``: as the law has it; ``from_date``: from a date on, or between two; ``carried_on``: a law of time that
+        goes on in the next recording, or comes again every day; ``over_hours``: slowly; ``parameter``: one outside its
+        prior.
+        """
+        return HOW[self.ending] if self.unknown is None else "parameter"
 
     @property
     def label(self) -> str:

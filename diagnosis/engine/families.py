@@ -126,7 +126,7 @@ def parameters_outside(experiment: Experiment) -> list[Hypothesis]:
     """Every parameter of the network outside its prior."""
     return [
         Hypothesis(name="parameter", place=unknown.parameter.name, family="parameter", unknown=index,
-                   law=f"parameter {unknown.parameter.name}", how="parameter", variants=np.ones((1, 1)))
+                   law=f"parameter {unknown.parameter.name}", variants=np.ones((1, 1)))
         for index, unknown in enumerate(experiment.unknowns)
         if isinstance(unknown, NetworkParameter)
     ]  # fmt: skip

@@ -16,8 +16,8 @@ import sympy as sp
 from diagnosis.engine.calibration import NearReadings
 from diagnosis.engine.fit import Fit
 from diagnosis.engine.learnt import ErrorClass
-from diagnosis.engine.model_error import ModelError, groups, heats
-from diagnosis.engine.model_error.courses import Constant, Smooth, Standard
+from diagnosis.engine.model_error import ModelError, courses, groups, heats
+from diagnosis.engine.model_error.courses import Smooth, Standard
 from diagnosis.engine.point import Machine
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from models.base.types import Array
@@ -137,7 +137,7 @@ def _factors(found: Found, spread: Spread) -> Iterator[Term]:
     of_kinds: dict[Kind, list[tuple[str, float, Array]]] = {}
     for one, own, every in found:
         match one:
-            case groups.HeatChange(heat=heats.SourceHeat() | heats.LinkHeat() as heat, course=Constant()):
+            case groups.HeatChange(heat=heats.SourceHeat() | heats.LinkHeat() as heat, course=courses.CONSTANT):
                 of_kinds.setdefault(_kind(heat), []).append((heat.names[0], float(own[0]), every))
     for kind, each in of_kinds.items():
         names, factors, unknowns = zip(*each, strict=True)

@@ -8,14 +8,14 @@ from functools import cached_property
 
 import numpy as np
 
-from diagnosis.engine.slopes import Heat, LawSlopes
+from diagnosis.engine.slopes import LawSlopes
 from diagnosis.forward.grid import Piece
 from diagnosis.forward.network_on_grid import Balance, NetworkOnGrid
 from diagnosis.forward.observation import Sensors, reading_columns, readings
 from diagnosis.forward.recorder import PASSES
 from diagnosis.forward.sensor_fault import delayed
 from diagnosis.forward.term_on_grid import TermOnGrid, moved_heat
-from diagnosis.forward.trajectory import Trajectory, parameter_heat, settled_balance
+from diagnosis.forward.trajectory import Heat, Trajectory, parameter_heat, settled_balance
 from models.base.types import Array
 from models.correction.instruments import Mix
 from models.quantities.quantities import is_total_loss
@@ -204,8 +204,7 @@ class Point:
         index = self.machine.parameter_index[name]
         p, value = model.network.parameters[index], float(self.trajectory.values[index])
         step = MEMORY_STEP * p.sd * (value if p.log else 1.0)
-        into, loss = parameter_heat(model, self.trajectory, index, step)
-        return Heat(into=into, loss=loss)
+        return parameter_heat(model, self.trajectory, index, step)
 
     def heat_per_relative(self, name: str) -> Heat:
         """Net heat per relative change of an input, through the losses too."""
@@ -223,8 +222,7 @@ class Point:
     def moved_heat(self, samples: Array, step: float) -> Heat:
         """Net heat per unit of a change of the inputs by so many units, shape of `samples` (K, S, inputs)."""
         piece = replace(self.trajectory.piece, samples=samples)
-        into, loss = moved_heat(self.machine.model, self.trajectory, piece)
-        return Heat(into=into / step, loss=loss / step)
+        return moved_heat(self.machine.model, self.trajectory, piece) / step
 
     def term_column(self, label: str, name: str, per_z: float, step_z: float) -> Column:
         """Column of a parameter of a term outside the network, by a difference."""
@@ -260,7 +258,7 @@ class Point:
         Parameters
         ----------
         into : Array, shape (K, parts + coupled, columns)
-            See :class:`diagnosis.engine.slopes.Heat`
+            See :class:`diagnosis.forward.trajectory.Heat`
         loss : Array, shape (K, columns)
 
         Returns

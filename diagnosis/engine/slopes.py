@@ -6,7 +6,6 @@ The laws are symbolic expressions, so are their derivatives.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -14,33 +13,9 @@ import numpy as np
 import sympy as sp
 
 from diagnosis.forward.network_on_grid import Balance, NetworkOnGrid
-from diagnosis.forward.trajectory import Trajectory, losses_along
-from models.base.types import Array
+from diagnosis.forward.trajectory import Heat, Trajectory, losses_along
 from models.formulas.extremes import Max, Min
 from models.network.laws import compile_function, function_source, symbol
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Heat:
-    """Further heat in a network on all intervals, per unit of something.
-
-    Attributes
-    ----------
-    into : Array, shape (K, parts + coupled)
-        Net heat into every part [W], then the rates of the states that are solved with the temperatures
-    loss : Array, shape (K,)
-        What of it is mechanical loss at fixed temperatures, [W]
-    """
-
-    into: Array
-    loss: Array
-
-    def __add__(self, other: Heat) -> Heat:
-        return Heat(into=self.into + other.into, loss=self.loss + other.loss)
-
-    def __mul__(self, factor: Array | float) -> Heat:
-        factor = np.asarray(factor, dtype=float)
-        return Heat(into=self.into * (factor[:, None] if factor.ndim else factor), loss=self.loss * factor)
 
 
 class LawSlopes:

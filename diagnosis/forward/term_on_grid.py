@@ -18,7 +18,7 @@ from diagnosis.forward.kept import kept
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.observation import Sensors, boundary_temperatures, to_points
 from diagnosis.forward.sensor_fault import distorted, passed_on
-from diagnosis.forward.trajectory import Trajectory, heat_change, losses_along
+from diagnosis.forward.trajectory import Heat, Trajectory, heat_change, losses_along
 from models.base.types import Array
 from models.network.laws import compile_each, symbol
 from models.terms.term import FACTORS, Term
@@ -132,9 +132,9 @@ class TermOnGrid:
                 within = law if there is None else self.law(trajectory, there[None, :])[0].T
             loss = loss + self._factor_heat(trajectory, law, within, heat)
         else:  # an input
-            per_unit, loss_per_unit = input_slope(model, trajectory, term.target[0])
-            heat = per_unit[:, :, None] * law[:, None, :]
-            loss = loss_per_unit[:, None] * law
+            per_unit = input_slope(model, trajectory, term.target[0])
+            heat = per_unit.into[:, :, None] * law[:, None, :]
+            loss = per_unit.loss[:, None] * law
         return heat, loss
 
     def _factor_heat(self, trajectory: Trajectory, law: Array, within: Array, heat: Array) -> Array:
@@ -227,17 +227,16 @@ def _compiled(
 
 
 @kept
-def input_slope(model: NetworkOnGrid, trajectory: Trajectory, name: str) -> tuple[Array, Array]:
-    """Net heat, shape (K, parts + coupled), and loss, (K,), per unit of an input."""
+def input_slope(model: NetworkOnGrid, trajectory: Trajectory, name: str) -> Heat:
+    """Heat per unit of an input."""
     step = INPUT_STEP.get(name, OTHER_INPUT_STEP)
     samples = np.array(trajectory.piece.samples)
     samples[..., model.laws.inputs.index(name)] += step
-    heat, loss = moved_heat(model, trajectory, replace(trajectory.piece, samples=samples))
-    return heat / step, loss / step
+    return moved_heat(model, trajectory, replace(trajectory.piece, samples=samples)) / step
 
 
-def moved_heat(model: NetworkOnGrid, trajectory: Trajectory, moved: Piece) -> tuple[Array, Array]:
-    """Change of the net heat, (K, parts + coupled), and of the loss, (K,), when the inputs of a piece are others."""
+def moved_heat(model: NetworkOnGrid, trajectory: Trajectory, moved: Piece) -> Heat:
+    """Change of heat when the inputs of a piece are others."""
     power = losses_along(model, trajectory)
     if not np.array_equal(moved.samples[..., :2], trajectory.piece.samples[..., :2]):
         power = power + model.loss_at(moved.samples, trajectory.middle) - _losses(model, trajectory)

@@ -347,46 +347,50 @@ def losses_along(model: NetworkOnGrid, trajectory: Trajectory) -> Array:
     return trajectory.tangent.at(trajectory.middle[:, model.loss_nodes])
 
 
-def parameter_heat(model: NetworkOnGrid, trajectory: Trajectory, index: int, step: float) -> tuple[Array, Array]:
-    """Net heat and total loss per unit of a parameter, along a trajectory, by a difference.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Heat:
+    """Further heat in a network on all intervals, per unit of something.
 
-    Parameters
+    Attributes
     ----------
-    index : int
-        Which parameter
-    step : float
-        In its unit
-
-    Returns
-    -------
-    heat, loss : Array
-        See :func:`heat_change`, per unit of the parameter
+    into : Array, shape (K, parts + coupled)
+        Net heat into every part [W], including the change of stored heat that another capacity makes; then the rates of
+        the states that are solved with the temperatures
+    loss : Array, shape (K,)
+        What of it is mechanical loss at fixed temperatures, [W]
     """
+
+    into: Array
+    loss: Array
+
+    def __add__(self, other: Heat) -> Heat:
+        return Heat(into=self.into + other.into, loss=self.loss + other.loss)
+
+    def __mul__(self, factor: Array | float) -> Heat:
+        factor = np.asarray(factor, dtype=float)
+        return Heat(into=self.into * (factor[:, None] if factor.ndim else factor), loss=self.loss * factor)
+
+    def __truediv__(self, step: float) -> Heat:
+        return Heat(into=self.into / step, loss=self.loss / step)
+
+
+def parameter_heat(model: NetworkOnGrid, trajectory: Trajectory, index: int, step: float) -> Heat:
+    """Heat per unit of a parameter along a trajectory, by a difference of so many units."""
     values = trajectory.values.copy()
     values[index] += step
     power = losses_along(model, trajectory)
     memory = model.memory(trajectory.piece, trajectory.T, trajectory.seen, values, power, trajectory.memory)
-    heat, loss = heat_change(model, trajectory, trajectory.piece, values, power, memory)
-    return heat / step, loss / step
+    return heat_change(model, trajectory, trajectory.piece, values, power, memory) / step
 
 
 def heat_change(
     model: NetworkOnGrid, trajectory: Trajectory, piece: Piece, values: Array, power: Array, memory: Array
-) -> tuple[Array, Array]:
-    """Change of heat and loss along a trajectory when inputs, parameters, nominal losses or memories are others.
-
-    Returns
-    -------
-    heat : Array, shape (K, parts + coupled)
-        Net heat [W], including the change of stored heat that another capacity makes; then the rates of the states that
-        are solved with the temperatures
-    loss : Array, shape (K,)
-        Total mechanical loss, [W]
-    """
+) -> Heat:
+    """Change of heat along a trajectory when inputs, parameters, nominal losses or memories are others."""
     T, here = trajectory.middle, settled_balance(model, trajectory)
     there = model.balance(piece, T, values, power, memory)
     heat = there.heat * (trajectory.capacities / model.capacities(values)) - here.heat
     if model.coupled:
         before = model.rates(trajectory.piece, T, trajectory.values, losses_along(model, trajectory), trajectory.memory)
         heat = np.concatenate([heat, model.rates(piece, T, values, power, memory) - before], axis=-1)
-    return heat, (there.sources - here.sources)[:, model.is_loss].sum(axis=-1)
+    return Heat(into=heat, loss=(there.sources - here.sources)[:, model.is_loss].sum(axis=-1))

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.candidates.dated import WHILE
+from diagnosis.candidates.hypotheses import WHILE
 from diagnosis.decision.posterior import Judged, Posterior
 from diagnosis.recordings.cleaning import runs
 from diagnosis.results.findings import heats_of

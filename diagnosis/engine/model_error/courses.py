@@ -13,7 +13,7 @@ Rasmussen, Williams, Gaussian Processes for Machine Learning (2006), sections 2.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -174,14 +174,28 @@ class Course(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Constant:
-    """Always there."""
+class Single:
+    """One function of time.
 
-    labels: tuple[str, ...] = ("constant",)
+    Attributes
+    ----------
+    label : str
+        Its name
+    values : callable
+        Its values at the middles of the intervals of a view, shape (K,), [-]
+    """
+
+    label: str
+    values: Callable[[View], Array]
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Its name."""
+        return (self.label,)
 
     def along(self, view: View) -> Array:
-        """Ones."""
-        return np.ones((len(view.trajectory.piece.steps), 1))
+        """The function."""
+        return self.values(view)[:, None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -239,36 +253,14 @@ class OwnTemperature:
         return np.stack([x, 0.5 * x * x, *(x * view.coordinates[name] for name in self.coordinates)], axis=1)
 
 
-@dataclass(frozen=True, kw_only=True)
-class LaggedDrive:
+def _lagged_drive(view: View) -> Array:
     """By how much faster, or hotter, the machine ran before."""
-
-    labels: tuple[str, ...] = ("before",)
-
-    def along(self, view: View) -> Array:
-        """The function."""
-        middle = view.trajectory.piece.middle
-        change = (lagged(view.drive, np.diff(middle), LAG_S) - view.drive) / view.standard.drive
-        return np.asarray(np.clip(change, -LAG_REACH, LAG_REACH))[:, None]
+    middle = view.trajectory.piece.middle
+    change = (lagged(view.drive, np.diff(middle), LAG_S) - view.drive) / view.standard.drive
+    return np.asarray(np.clip(change, -LAG_REACH, LAG_REACH))
 
 
-@dataclass(frozen=True, kw_only=True)
-class Hours:
-    """Time since the start of the recording."""
-
-    labels: tuple[str, ...] = ("hours",)
-
-    def along(self, view: View) -> Array:
-        """A straight line."""
-        return np.asarray(view.trajectory.piece.middle / view.standard.hours_s)[:, None]
-
-
-@dataclass(frozen=True, kw_only=True)
-class AfterStart:
-    """A decay after the start of the recording."""
-
-    labels: tuple[str, ...] = ("after start",)
-
-    def along(self, view: View) -> Array:
-        """An exponential."""
-        return np.asarray(np.exp(-view.trajectory.piece.middle / START_S))[:, None]
+CONSTANT = Single(label="constant", values=lambda view: np.ones(len(view.trajectory.piece.steps)))
+LAGGED_DRIVE = Single(label="before", values=_lagged_drive)
+HOURS = Single(label="hours", values=lambda view: view.trajectory.piece.middle / view.standard.hours_s)
+AFTER_START = Single(label="after start", values=lambda view: np.exp(-view.trajectory.piece.middle / START_S))

@@ -92,7 +92,9 @@ class ModelError:
                     into[:, part, mine] = heat.into[:, part, None] * course
                 loss[:, mine] = heat.loss[:, None] * course
             else:
-                reading[:, point.sensors.channels.index(change.channel), mine.start] = change.reading(view)
+                reading[:, point.sensors.channels.index(change.channel), mine.start] = change.reading(
+                    view, change.channel
+                )
         return ErrorCourse(heat=into, loss=loss, reading=reading)
 
     def whitened(self, part: Linear) -> Array:

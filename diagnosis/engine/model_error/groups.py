@@ -15,20 +15,20 @@ import numpy as np
 from diagnosis.engine.model_error import heats
 from diagnosis.engine.model_error.anatomy import AMBIENT, Anatomy, Family
 from diagnosis.engine.model_error.courses import (
+    AFTER_START,
+    CONSTANT,
+    HOURS,
+    LAGGED_DRIVE,
     SPEED,
     TEMPERATURE,
     TORQUE,
-    AfterStart,
-    Constant,
     Course,
-    Hours,
-    LaggedDrive,
     OwnTemperature,
     Smooth,
     View,
 )
-from diagnosis.engine.slopes import Heat
 from diagnosis.forward.recurrence import lagged
+from diagnosis.forward.trajectory import Heat
 from models.base.types import Array
 from models.quantities.quantities import TOTAL_LOSS
 
@@ -38,7 +38,6 @@ FEW = 3  # links of a family that have a law each
 SENSOR_LAGS_S = (150.0, 600.0)
 CORE_TIMES_S = (150.0, 600.0, 2400.0)
 MASS_TIMES_S = (9_600.0, 38_400.0)
-CONSTANT = Constant()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,12 +67,12 @@ class ReadingChange:
     Attributes
     ----------
     reading : callable
-        Change per unit along the piece of a view, shape (K + 1,), [K] or [W]
+        Change of a channel per unit along the piece of a view, shape (K + 1,), [K] or [W]
     """
 
     channel: str
     what: str
-    reading: Callable[[View], Array]
+    reading: Callable[[View, str], Array]
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -88,24 +87,22 @@ Change = HeatChange | ReadingChange
 class Near:
     """A thermometer feels a neighbour of its node."""
 
-    channel: str
     node: str
 
-    def __call__(self, view: View) -> Array:
+    def __call__(self, view: View, channel: str) -> Array:
         """Along a piece, per share."""
-        return _followed(view, self.channel, self.node) - _followed(view, self.channel)
+        return _followed(view, channel, self.node) - _followed(view, channel)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Late:
     """A share of what a thermometer feels comes with a time constant, [s]."""
 
-    channel: str
     time: float
 
-    def __call__(self, view: View) -> Array:
+    def __call__(self, view: View, channel: str) -> Array:
         """Along a piece, per share."""
-        T = _followed(view, self.channel)
+        T = _followed(view, channel)
         return np.asarray(lagged(T, view.trajectory.piece.steps, self.time) - T)
 
 
@@ -151,14 +148,14 @@ def sensor_places(machine: Anatomy) -> Iterator[Change]:
     """A thermometer feels a neighbour of its node."""
     for channel in machine.thermometers:
         for node in machine.around_sensor(channel):
-            yield ReadingChange(channel=channel, what=f"near {node}", reading=Near(channel=channel, node=node))
+            yield ReadingChange(channel=channel, what=f"near {node}", reading=Near(node=node))
 
 
 def slow_sensors(machine: Anatomy) -> Iterator[Change]:
     """A share of a thermometer's reading comes late."""
     for channel in machine.thermometers:
         for time in machine.resolved(SENSOR_LAGS_S):
-            yield ReadingChange(channel=channel, what=f"{time:g} s late", reading=Late(channel=channel, time=time))
+            yield ReadingChange(channel=channel, what=f"{time:g} s late", reading=Late(time=time))
 
 
 def slow_cores(machine: Anatomy) -> Iterator[Change]:
@@ -230,13 +227,13 @@ def losses_by_own_temperature(machine: Anatomy) -> Iterator[Change]:
 
 def memories(machine: Anatomy) -> Iterator[Change]:
     """Losses and links by the operation before."""
-    return _everything(machine, LaggedDrive())
+    return _everything(machine, LAGGED_DRIVE)
 
 
 def ageing(machine: Anatomy) -> Iterator[Change]:
     """Losses and links by the hours, losses by the time after the start."""
-    yield from _everything(machine, Hours())
-    yield from (_of_sources(source.name, (source.name,), AfterStart()) for source in machine.network.sources)
+    yield from _everything(machine, HOURS)
+    yield from (_of_sources(source.name, (source.name,), AFTER_START) for source in machine.network.sources)
 
 
 GROUPS: Mapping[str, Callable[[Anatomy], Iterator[Change]]] = {
@@ -279,5 +276,5 @@ def _link_course(machine: Anatomy, family: Family) -> Smooth | None:
     return Smooth(coordinates=by, highest=degree) if by else None
 
 
-def _zero(view: View) -> Array:
+def _zero(view: View, _: str) -> Array:
     return np.full(len(view.trajectory.T), view.standard.heat)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.engine.model_error.courses import SPEED, TORQUE, View
-from diagnosis.engine.slopes import Heat
 from diagnosis.forward.recurrence import lagged
+from diagnosis.forward.trajectory import Heat
 from models.base.types import Array
 
 STEP = 0.01  # of the largest torque

@@ -175,7 +175,7 @@ def test_a_parameter_outside_its_prior_is_no_sign_that_something_is_missing() ->
     mechanism = Hypothesis(name="windage", place="oil", family="no-load loss", law="windage", variants=np.ones((1, 1)),
                            log_prior=np.log(0.9))  # fmt: skip
     parameter = Hypothesis(name="parameter", place="h_air", family="parameter", unknown=0, variants=np.ones((1, 1)),
-                           law="parameter h_air", how="parameter", log_prior=np.log(0.1))  # fmt: skip
+                           law="parameter h_air", log_prior=np.log(0.1))  # fmt: skip
     found = Scanned(candidates=(mechanism, parameter), log_bayes=np.array([60.0, 80.0]),
                     classes=(), best=())  # fmt: skip
     assert found.log_e == pytest.approx(60.0 - 80.0 + np.log(9.0))
@@ -187,7 +187,7 @@ def test_a_change_over_time_counts_less_where_the_model_fits_badly_without_it_or
     full = next(one for one in error_classes() if one.name == "full")
     small = next(one for one in error_classes() if one.name == "splits")
     always = named("windage", "oil")
-    dated = replace(always, how="from_date")
+    dated = replace(always, ending="step")
     assert counts_less((always, dated), full, full).tolist() == [0.0, full.over_time] and full.over_time > 20.0
     assert counts_less((always, dated), full, small).tolist() == [0.0, 0.5 * full.over_time]
     assert not counts_less((always, dated), small, small).any()
@@ -198,7 +198,7 @@ def test_a_change_over_time_counts_less_where_the_model_fits_badly_without_it_or
 
 def test_of_what_is_trusted_only_counts_less_what_baselines_bring() -> None:
     full = next(one for one in error_classes() if one.name == "full")
-    cooling, probe = (replace(named(name, "oil"), how="from_date", trusted=trusted)
+    cooling, probe = (replace(named(name, "oil"), ending="step", trusted=trusted)
                       for name, trusted in (("air_cooling_step", True), ("sensor_bias_step", False)))  # fmt: skip
     assert counts_less((cooling, probe), full, full).tolist() == [0.0, full.over_time]
     assert counts_less((replace(cooling, less=40.0),), full, full).tolist() == [40.0 - full.over_time]

@@ -43,11 +43,11 @@ def effect(
 
 def outside(parameter: str) -> Hypothesis:
     """A parameter outside its prior."""
-    return effect("parameter", parameter, term=None, unknown=0, law=f"parameter {parameter}", how="parameter")
+    return effect("parameter", parameter, term=None, unknown=0, law=f"parameter {parameter}")
 
 
 def over_hours(law: str) -> Hypothesis:
-    return effect(f"{law}_over_hours", law=law, how="over_hours", clock="start")
+    return effect(f"{law}_over_hours", law=law, ending="over_hours", clock="start")
 
 
 def judged(log_bayes: float, *effects: Hypothesis) -> Judged:
@@ -92,7 +92,7 @@ def test_places_weigh_in_the_mean_by_their_priors() -> None:
 
 
 def test_a_law_and_its_change_at_a_date_are_one_name() -> None:
-    always, dated = effect("windage"), effect("windage_step", law="windage", how="from_date", clock="start")
+    always, dated = effect("windage"), effect("windage_step", law="windage", ending="step", clock="start")
     hours = over_hours("windage")
     (found,) = posterior(judged(20.0, always), judged(STRONG, dated), judged(0.0, hours)).explanations
     assert found.names == ("windage",) and found.members[0].effects == (dated,)
@@ -259,7 +259,7 @@ def test_both_effects_of_a_pair_are_answered() -> None:
 @pytest.mark.parametrize(("apart_s", "grade"), [(2400.0, "likely"), (2600.0, "claim")])
 def test_two_that_begin_at_the_same_time_are_no_claims(apart_s: float, grade: str) -> None:
     """In 100 000 s two dates are less than 2500 s apart in one of twenty cases: one cause is more probable."""
-    pair = [effect(name, how="from_date", clock="start", date=f"{name}_since") for name in ("first", "second")]
+    pair = [effect(name, ending="step", clock="start", date=f"{name}_since") for name in ("first", "second")]
     unknowns = [SimpleNamespace(parameter=SimpleNamespace(name=name), value=float)
                 for name in ("first_since", "other", "second_since")]  # fmt: skip
     pieces = [SimpleNamespace(recording=name, steps=np.full(100, 1000.0)) for name in ("tested", "healthy")]
@@ -357,7 +357,7 @@ def test_a_fit_at_the_best_place_goes_before_others() -> None:
 
 def test_a_parameter_outside_its_prior_is_answered_by_its_name() -> None:
     h_air, h_oil = (
-        effect("parameter", name, term=None, unknown=i, law=f"parameter {name}", how="parameter")
+        effect("parameter", name, term=None, unknown=i, law=f"parameter {name}")
         for i, name in enumerate(("air", "oil"))
     )
     found = posterior(judged(STRONG, h_air), judged(0.0, h_oil), log_e=-1.0, log_parameter=100.0)

@@ -169,7 +169,7 @@ def test_derivatives_of_a_slow_valve(fzg: Gearbox) -> None:
     names = [p.name for p in model.network.parameters]
     for parameter, least in zip((placed.parameters[0], placed.parameters[4]), (1.0, 0.01), strict=True):
         step = 0.02 * given[parameter.name]
-        heat, _ = parameter_heat(model, found, names.index(parameter.name), step)
+        heat = parameter_heat(model, found, names.index(parameter.name), step).into
         column = found.response(heat[:, :, None])[..., 0]
         sides = []
         for moved in (given[parameter.name] + step, given[parameter.name] - step):

@@ -124,7 +124,7 @@ def test_a_tank_is_solved_with_the_temperatures(fzg: Gearbox, piece: Piece, ride
     names = [p.name for p in model.network.parameters]
     for name in (placed.parameters[1].name, placed.parameters[2].name):
         step = 0.02 * given[name]
-        heat, _ = parameter_heat(model, found, names.index(name), step)
+        heat = parameter_heat(model, found, names.index(name), step).into
         column = found.response(heat[:, :, None])[:, nodes, 0]
         sides = [simulate(model, piece, named_values(model.network, given | {name: given[name] + sign * step}),
                           found.T[0], settled_K=1e-6, rounds=20).T[:, nodes] for sign in (1, -1)]  # fmt: skip
@@ -132,7 +132,7 @@ def test_a_tank_is_solved_with_the_temperatures(fzg: Gearbox, piece: Piece, ride
         assert np.abs(column - numeric).max() < 0.03 * np.abs(numeric).max()
     warm, at = np.array(piece.samples), model.laws.inputs.index("T_ambient")
     warm[..., at] += 0.5
-    column = found.response(input_slope(model, found, "T_ambient")[0][:, :, None])[:, nodes, 0]
+    column = found.response(input_slope(model, found, "T_ambient").into[:, :, None])[:, nodes, 0]
     sides = [simulate(model, one, values, found.T[0], settled_K=1e-6, rounds=20).T[:, nodes]
              for one in (replace(piece, samples=warm), piece)]  # fmt: skip
     numeric = (sides[0] - sides[1]) / 0.5

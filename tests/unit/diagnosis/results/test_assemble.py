@@ -108,7 +108,7 @@ def test_where_model_error_is_large_held_out_readings_have_to_confirm_a_claim(
 ) -> None:
     """Of what always acts: what began at a date may be over by then."""
     monkeypatch.setattr(predictions, "log_score_gain", lambda *_: 0.5)
-    dated = replace(windage, effects=tuple(replace(one, how="from_date") for one in windage.effects))
+    dated = replace(windage, effects=tuple(replace(one, ending="step") for one in windage.effects))
     full, none = error_classes()[-1], error_classes()[0]
     for best, grade in ((replace(windage, error_class=full), "likely"), (replace(windage, error_class=none), "claim"),
                         (replace(dated, error_class=full), "claim")):  # fmt: skip
@@ -406,7 +406,7 @@ def test_a_parameter(assembled_alike: Assemble, prepared: Prepared) -> None:
     z[index] = wide.z_of(value)
     fit = replace(plain.experiment, unknowns=unknowns).fit(z, iterations=0)
     effect = Hypothesis(name="parameter", place=name, family="parameter", unknown=index, law=f"parameter {name}",
-                        variants=np.ones((1, 1)), how="parameter", log_prior=-3.0)  # fmt: skip
+                        variants=np.ones((1, 1)), log_prior=-3.0)  # fmt: skip
     judged = Judged(effects=(effect,), log_bayes=40.0, fit=fit, error_class=error_classes()[0])
     answer = Answer(best=judged, effect=effect, grade="claim", probability=0.95, joint=0.95)
     raised = replace(posterior_of(plain, judged, log_e=1.0, log_parameter=40.0), threshold=238.0)  # by a baseline

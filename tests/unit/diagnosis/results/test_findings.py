@@ -22,7 +22,7 @@ from models.network.laws import Parameter
 ])  # fmt: skip
 def test_a_parameter_that_is_off_by_a_unit_asks_for_the_unit(value: float, stated: float, slip: bool) -> None:
     effect = Hypothesis(name="parameter", place="gears_load", family="parameter", unknown=0,
-                        law="parameter gears_load", variants=np.ones((1, 1)), how="parameter")  # fmt: skip
+                        law="parameter gears_load", variants=np.ones((1, 1)))  # fmt: skip
     answer = cast(Any, SimpleNamespace(effect=effect, acts_like=False, one_event=False, tied=()))
     says = _says(answer, {"gears_load": value}, {"gears_load": stated})
     assert says.startswith(f"The parameter gears_load is {value:.3g}, far from what the definition allows.")

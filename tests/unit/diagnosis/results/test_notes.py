@@ -77,7 +77,7 @@ def test_a_baseline_that_brings_evidence_is_noted(noted: Callable[..., tuple[str
 
 def test_what_a_baseline_takes_from_a_change_is_noted(noted: Callable[..., tuple[str, ...]], windage: Judged) -> None:
     step = Hypothesis(name="air_cooling_step", place="air", family="heat", law="air_cooling",
-                      variants=np.ones((1, 1)), how="from_date", less=95.0)  # fmt: skip
+                      variants=np.ones((1, 1)), ending="step", less=95.0)  # fmt: skip
 
     def behind(taken: float) -> Judged:
         return replace(windage, effects=(replace(step, less=taken),), log_bayes=20.0, fit=None)
