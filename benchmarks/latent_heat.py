@@ -31,7 +31,7 @@ class LatentHeat:
 
 def latent_heat(fit: Fit, node: str, *, loss_W: float, is_loss: bool) -> LatentHeat:
     """Evidence and course of an unknown heat in `node`; `is_loss`: one that the measured total loss would show."""
-    shapes, time, owner = _knots([part.point.trajectory.piece for part in fit.parts])
+    shapes, time, owner = _knots([part.point.piece for part in fit.parts])
     model, blocks = fit.experiment.machine.model, []
     wander = np.where(owner[:, None] == owner, np.exp(-np.abs(time[:, None] - time) / WANDER_S), 0.0)
     root = np.linalg.cholesky(LEVEL_SHARE + (1.0 - LEVEL_SHARE) * wander + 1e-9 * np.eye(len(time)))

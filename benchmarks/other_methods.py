@@ -75,7 +75,7 @@ def answers_to(setup: InferenceSetup, experiment: Experiment, even: tuple[Experi
     candidates = [
         hypothesis_of(placed)
         for mechanism in CATALOGUE.values()
-        for placed in mechanism.placed(experiment.machine.model.network, setup.scale, setup.channels)
+        for placed in mechanism.placed(experiment.network, setup.scale, setup.channels)
     ]
     return {
         "naive": _naive(setup, base, candidates),
@@ -107,7 +107,7 @@ def _sparse(setup: InferenceSetup, base: Fit, candidates: Sequence[Hypothesis]) 
     if missing.log_bayes < THRESHOLD or not here:
         return _answer(setup, None)
     # Intervals are of different lengths.
-    weights = np.sqrt(np.concatenate([part.point.trajectory.piece.steps for part in base.parts]))
+    weights = np.sqrt(np.concatenate([part.point.piece.steps for part in base.parts]))
     columns = weights[:, None] * np.column_stack([_heat(base, h) for h in here])
     target = weights * missing.mean
     norms = np.linalg.norm(columns, axis=0)

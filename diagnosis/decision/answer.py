@@ -152,7 +152,7 @@ def _begin_together(best: Judged, chance: float) -> bool:
         unknown.value(z) for unknown, z in zip(experiment.unknowns, best.fit.z.tolist(), strict=True)
         if unknown.parameter.name in names
     )  # fmt: skip
-    tested = sum(float(experiment.pieces[i].steps.sum()) for i in experiment.tested)
+    tested = sum(experiment.pieces[i].duration for i in experiment.tested)
     return abs(first - second) < 0.5 * chance * tested
 
 

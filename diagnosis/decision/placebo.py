@@ -48,7 +48,7 @@ def judge_baselines(
         return None, tuple(candidates)
     hours = dict.fromkeys((piece.recording for piece in whole.pieces), 0.0)
     for piece in whole.pieces:
-        hours[piece.recording] += float(piece.steps.sum())
+        hours[piece.recording] += piece.duration
     tested = sum(value for name, value in hours.items() if name not in whole.healthy)
     fit = calibration.fit.part(whole.baselines)
     calibration = replace(calibration, chosen=replace(calibration.chosen, fit=fit))

@@ -53,7 +53,7 @@ def candidates_of(setup: InferenceSetup, experiment: Experiment) -> tuple[Hypoth
         Mechanisms of the catalogue, changes at a date and over hours, laws of time that go on in the next recording,
         other set-points of known controls, parameters outside their priors
     """
-    network = experiment.machine.model.network
+    network = experiment.network
     known = {p.name for p in network.parameters}  # what the machine is known to have is there once
     placed = [one for m in setup.catalogue.values() for one in m.placed(network, setup.scale, setup.channels)
               if one.strength.name not in known]  # fmt: skip

@@ -17,6 +17,7 @@ from diagnosis.forward.trajectory import ROUNDS, Trajectory, simulate
 from diagnosis.forward.whitening import AS_ASSUMED, Noise, RandomHeat, Whitening
 from models.base.errors import InputError
 from models.base.types import Array
+from models.simulation.thermal_network import ThermalNetwork
 
 FIRST_ITERATIONS, ITERATIONS = 4, 8
 SETTLED = 0.05  # of a prior standard deviation
@@ -77,6 +78,11 @@ class Experiment:
     metric: Metric = NOISE_ALONE
     random_heat: RandomHeat = AS_ASSUMED
     most_deviation: float = np.inf
+
+    @property
+    def network(self) -> ThermalNetwork:
+        """The network of the machine."""
+        return self.machine.model.network
 
     @property
     def slow(self) -> bool:
@@ -173,7 +179,7 @@ class Experiment:
 
     def columns(self, point: Point, z: Array) -> Array:
         """Derivatives of the readings of a piece, shape (K + 1, channels, unknowns); 0 outside an unknown's scope."""
-        recording = point.trajectory.piece.recording
+        recording = point.piece.recording
         return point.responses([
             unknown.column(point, value) if in_scope(unknown, recording) else Column()
             for unknown, value in zip(self.unknowns, z.tolist(), strict=True)

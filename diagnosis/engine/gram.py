@@ -193,7 +193,7 @@ def gram_of(parts: Sequence[Linear], base: Sequence[Array], chosen: Sequence[Arr
     of_recording: dict[str, Array] = {}
     determinants: dict[str, float] = {}
     for index, (part, W) in enumerate(zip(parts, base, strict=True)):
-        name = part.point.trajectory.piece.recording
+        name = part.point.piece.recording
         whole = W.T @ W
         if chosen:
             X = chosen[index]

@@ -98,7 +98,7 @@ def with_learnt_error(fit: Fit, near: NearReadings, error_class: ErrorClass) -> 
     def spread(combination: Array) -> float:
         return metric.spread(combination @ directions)
 
-    learnt = learnt_error(near.error, directions @ found[: metric.shared], spread, experiment.machine.model.network)
+    learnt = learnt_error(near.error, directions @ found[: metric.shared], spread, experiment.network)
     there = replace(experiment, machine=learnt.added_to(experiment.machine))
     return replace(fit, experiment=there, z=np.clip(z, *experiment.bounds)), learnt.terms
 

@@ -23,7 +23,7 @@ SIZES = (0.3, 1.0, 3.0)  # of the prior of an unknown heat
 
 def outside_of(setup: InferenceSetup, experiment: Experiment) -> list[Hypothesis]:
     """An unknown heat, and an unknown loss, in every part."""
-    return unknown_heats(experiment.machine.model.network, setup.scale, axis_of(experiment),
+    return unknown_heats(experiment.network, setup.scale, axis_of(experiment),
                          losses=TOTAL_LOSS in setup.channels)  # fmt: skip
 
 

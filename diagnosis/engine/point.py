@@ -163,6 +163,11 @@ class Point:
     read: Array
 
     @property
+    def piece(self) -> Piece:
+        """The piece, with its inputs as they probably were."""
+        return self.trajectory.piece
+
+    @property
     def machine(self) -> Machine:
         """The machine that is simulated."""
         return self.setting.machine
@@ -175,12 +180,12 @@ class Point:
     @property
     def residual(self) -> Array:
         """Measured minus read, shape (K + 1, channels), NaN where nothing was measured."""
-        return np.asarray(self.trajectory.piece.measured - self.read)
+        return np.asarray(self.piece.measured - self.read)
 
     @property
     def residual_without_error(self) -> Array:
         """Measured minus read without the model error that was assumed, to first order, shape (K + 1, channels)."""
-        error = self.trajectory.piece.error
+        error = self.piece.error
         if error is None:
             return self.residual
         into = np.pad(error.heat, ((0, 0), (0, len(self.machine.model.coupled))))
@@ -221,7 +226,7 @@ class Point:
 
     def moved_heat(self, samples: Array, step: float) -> Heat:
         """Net heat per unit of a change of the inputs by so many units, shape of `samples` (K, S, inputs)."""
-        piece = replace(self.trajectory.piece, samples=samples)
+        piece = replace(self.piece, samples=samples)
         return moved_heat(self.machine.model, self.trajectory, piece) / step
 
     def term_column(self, label: str, name: str, per_z: float, step_z: float) -> Column:

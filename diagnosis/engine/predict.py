@@ -231,5 +231,5 @@ def _log_density(fit: Fit, held_out: Experiment, runs: Sequence[Prediction]) -> 
 
 def _nearer(part: Linear, run: Prediction) -> Array:
     """Innovations of the course that is nearer, shape (readings,)."""
-    own = part.filter((part.point.trajectory.piece.measured - run.read)[:, :, None])[:, 0]
+    own = part.filter((part.point.piece.measured - run.read)[:, :, None])[:, 0]
     return min((part.residual, own), key=lambda innovations: float(innovations @ innovations))

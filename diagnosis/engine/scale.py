@@ -47,7 +47,7 @@ def at_stated_size(fit: Fit) -> Fit:
     Model error, whose size is stated in watts, may have moved it: it is larger in a smaller machine.
     """
     experiment = fit.experiment
-    network = experiment.machine.model.network
+    network = experiment.network
     if not (is_of_temperatures(experiment) and all_sizes_are_unknown(network, experiment.unknowns)):
         return fit
     direction = scale_direction(network, experiment.unknowns)

@@ -267,7 +267,7 @@ def course_of_heat(fit: Fit, term: Term) -> Array:
     at, courses = [index[p.name] for p in term.parameters], list[Array]()
     for point in (part.point for part in fit.parts):
         heat, _ = on_grid.heat(point.trajectory, point.setting.values[None, at])
-        courses.append(heat[:, :, 0].sum(axis=1) * np.sqrt(point.trajectory.piece.steps))
+        courses.append(heat[:, :, 0].sum(axis=1) * np.sqrt(point.piece.steps))
     return np.concatenate(courses)
 
 

@@ -128,7 +128,7 @@ def _estimated(with_error: Fit) -> list[list[int]]:
         machine there
     """
     known = with_error.experiment
-    if all_sizes_are_unknown(known.machine.model.network, known.unknowns):
+    if all_sizes_are_unknown(known.network, known.unknowns):
         return [[]]
     instruments = instruments_of(known)
     return [*([[*instruments, *_losses(with_error)]] if is_of_temperatures(known) else []), instruments]
@@ -220,7 +220,7 @@ def _off(experiment: Experiment, index: int, off_K: float) -> Noise:
 
 
 def _readings(experiment: Experiment, index: int) -> float:
-    return max(float(experiment.pieces[index].steps.sum()) / READING_S, 1.0)
+    return max(experiment.pieces[index].duration / READING_S, 1.0)
 
 
 def _missed_when_running_free(free: Experiment, fit: Fit) -> float:

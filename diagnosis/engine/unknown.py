@@ -109,7 +109,7 @@ class SensorLag(Unknown):
     def column(self, point: Point, z: float) -> Column:
         """Difference of the lagged course with the lag."""
         at = point.sensors.channels.index(self.channel)
-        T, steps = point.trajectory.T[:, point.machine.model.part_index(self.channel)], point.trajectory.piece.steps
+        T, steps = point.trajectory.T[:, point.machine.model.part_index(self.channel)], point.piece.steps
         lag = float(point.sensors.lag[at])
         there, here = (lagged(T, steps, lag * (1.0 + way)) for way in (LAG_STEP, -LAG_STEP))
         slope = (there - here) / (2.0 * LAG_STEP * lag)

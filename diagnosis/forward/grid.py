@@ -110,6 +110,11 @@ class Piece:
         """Lengths of the intervals, shape (K,), [s]."""
         return np.diff(self.time)
 
+    @property
+    def duration(self) -> float:
+        """How long it lasts, [s]."""
+        return float(self.steps.sum())
+
     def until(self, time: float) -> Piece:
         """The piece up to a time [s], with at least one interval."""
         return self.part(0, max(int(np.searchsorted(self.time, time, side="right")), 2) - 1)

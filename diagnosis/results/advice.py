@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.places import node_in
-from diagnosis.results.result import Verdict
-from diagnosis.results.result_parts import NO_CLAIM, Calibrated, Finding, Location, NotDetectable, Ranked
+from diagnosis.results.result import Diagnosis
+from diagnosis.results.result_parts import NO_CLAIM, Calibrated
 from diagnosis.setup.inference_setup import InferenceSetup
 from models.quantities.quantities import is_total_loss, node_of_channel
 
@@ -56,56 +56,40 @@ def data_sheet(recordings: Sequence[Recording], calibration: Sequence[Calibrated
     )
 
 
-def next_test(
-    setup: InferenceSetup, verdict: Verdict, findings: Sequence[Finding], location: Sequence[Location],
-    unseen: Sequence[NotDetectable], *, hints: Sequence[Ranked], calibration: Sequence[Calibrated],
-    missed: Sequence[str],
-) -> str:  # fmt: skip
-    """The next measurement; empty if there is nothing to ask for.
-
-    Parameters
-    ----------
-    location : sequence of Location
-        Most probable first
-    hints : sequence of Ranked
-        Names ahead of all others, most evidence first
-    calibration : sequence of Calibrated
-        Parameters of the machine and its instruments
-    missed : sequence of str
-        Held-out recordings that are missed, worst first
-    """
-    if verdict == "consistent" and missed:
-        return (f"diagnose {missed[0]} with the recordings that agree as baselines (--baseline): it shows what changed "
-                "between them")  # fmt: skip
+def next_test(setup: InferenceSetup, d: Diagnosis) -> str:
+    """The next measurement after a diagnosis; empty if there is nothing to ask for."""
+    if d.verdict == "consistent" and d.missed:
+        return (f"diagnose {d.missed[0]} with the recordings that agree as baselines (--baseline): it shows what "
+                "changed between them")  # fmt: skip
     assumed = {name for recording in (*setup.recordings, *setup.holdout) for name in recording.assumed}
-    if verdict == "unexplained" and "T_ambient" in assumed:
+    if d.verdict == "unexplained" and "T_ambient" in assumed:
         return "record T_ambient_degC: it is taken as constant, so changes of the air look like heat at other parts"
-    if not findings and (sheet := data_sheet(setup.recordings, calibration)):
+    if not d.findings and (sheet := data_sheet(setup.recordings, d.model.calibration)):
         return sheet
-    instead = [[rival for rival in finding.confusable_with if rival.instead] for finding in findings]
+    instead = [[rival for rival in finding.confusable_with if rival.instead] for finding in d.findings]
     asked = [rivals[0].separate_by for rivals in instead if rivals and rivals[0].probability >= WORTH_ASKING]
     if asked:
         return asked[0]
+    if d.verdict in NO_CLAIM:
+        return _for_more(setup, d)
     free = without_sensor(setup)
-    for place in location[1:]:
+    for place in d.location[1:]:
         if place.probability >= OTHER_PLACE and place.node in free:
             return f"a temperature sensor at {place.node.replace('_', ' ')}: it shows if the heat is there"
-    if verdict in NO_CLAIM:
-        return _for_more(setup, hints, unseen)
-    if verdict == "unexplained":
+    if d.verdict == "unexplained":
         return "repeat the operation in which the model is wrong, and change one input at a time"
-    if findings and findings[0].mechanism in setup.catalogue:
-        return setup.catalogue[findings[0].mechanism].experiment
+    if d.findings and d.findings[0].mechanism in setup.catalogue:
+        return setup.catalogue[d.findings[0].mechanism].experiment
     return ""
 
 
-def _for_more(setup: InferenceSetup, hints: Sequence[Ranked], unseen: Sequence[NotDetectable]) -> str:
+def _for_more(setup: InferenceSetup, d: Diagnosis) -> str:
     """The experiment where nothing was detected: of the name ahead of all others, or of most that cannot be seen."""
-    ahead = [hint.laws[0] for hint in hints if hint.laws[0] in setup.catalogue]
+    ahead = [hint.laws[0] for hint in d.hints if hint.laws[0] in setup.catalogue]
     if ahead:
         return f"{setup.catalogue[ahead[0]].experiment} (it would show {ahead[0]}, which is ahead of all other names)"
-    if not unseen:
+    if not d.unseen:
         return ""
-    wanted = Counter(one.needed for one in unseen).most_common(1)[0][0]
-    shown = " and ".join(one.mechanism for one in unseen if one.needed == wanted)
+    wanted = Counter(one.needed for one in d.unseen).most_common(1)[0][0]
+    shown = " and ".join(one.mechanism for one in d.unseen if one.needed == wanted)
     return f"{wanted} (it would show {shown}, which these data cannot)"

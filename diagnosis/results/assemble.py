@@ -37,7 +37,6 @@ from diagnosis.results.result_parts import (
     NotDetectable,
     Ranked,
     called,
-    hints_of,
     spoiled_in,
 )
 from diagnosis.setup.inference_setup import InferenceSetup
@@ -112,7 +111,6 @@ def assemble(
     # Held-out recordings that contradict one explanation do not make a machine healthy that the model is far from.
     unfit = bool(spoiled) or train.calibrated - train.before > setup.noise_K or (badly and valid.refuted is not None)
     verdict = verdict_of(posterior, [answer for answer, _ in reported], unseen, unfit=unfit, badly=badly)
-    ranking = _ranking(posterior, setup.recordings)
     location = locations_of(setup, posterior) if posterior.detected or verdict in NO_CLAIM else ()
     inputs = setup.gearbox.network().inputs
     most_probable = predicting.best if others is None else others.posterior.nothing
@@ -120,7 +118,7 @@ def assemble(
     runs = predicting.train_runs
     effects = predicting.best.effects if predicting.best else ()
     model = _calibrated(final, (runs["after"], runs["before"]), believed, plain, inputs, effects)
-    return Diagnosis(
+    found = Diagnosis(
         verdict=verdict,
         gearbox=setup.gearbox.name,
         log_e_value=posterior.evidence,
@@ -142,17 +140,13 @@ def assemble(
         misfit=_misfit(final),
         remaining_nat=0.0 if _looked_no_further(best) else posterior.left_by(best),
         remaining_note=_remaining(posterior, others, best) + (LEFT_OUT if valid.without_second else ""),
-        ranking=ranking,
+        ranking=_ranking(posterior, setup.recordings),
         unseen=unseen,
         not_tried=tuple(sorted(
             setup.catalogue.keys() - {one.effect.name for one in posterior.expected}
             - {f.mechanism for f in known.findings}
         )),
-        next_test=next_test(
-            setup, verdict, findings, location if posterior.detected else (), unseen,
-            hints=hints_of(ranking) if location else (), calibration=model.calibration,
-            missed=holdout.far_beyond(train, settings.matters_K),
-        ),
+        next_test="",
         courses=_courses(setup, predicting),
         network=setup.nominal,
         shapes=setup.shapes,
@@ -173,6 +167,7 @@ def assemble(
         refuted=valid.refuted,
         spoiled=spoiled,
     )  # fmt: skip
+    return replace(found, next_test=next_test(setup, found))
 
 
 def _provenance(setup: InferenceSetup) -> dict[str, Any]:

@@ -13,10 +13,9 @@ from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.answer import Answer
 from diagnosis.decision.posterior import Posterior
 from diagnosis.engine.fit import Experiment, Fit
-from diagnosis.engine.scan import scope_of
+from diagnosis.engine.scan import scope_of, term_on_grid
 from diagnosis.engine.unknown import SensorBias
 from diagnosis.forward.grid import Piece
-from diagnosis.forward.term_on_grid import TermOnGrid
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.advice import separation
 from diagnosis.results.joint_estimate import JointEstimate
@@ -41,7 +40,7 @@ def finding_of(answer: Answer, fit: Fit, setup: InferenceSetup, posterior: Poste
     """An answer with the numbers of a fit that has its effect; a heat like no law is never fitted and has none."""
     effect, term = answer.effect, answer.effect.term
     values, heats = values_of(fit, effect), heats_of(fit, effect)
-    pieces = [part.point.trajectory.piece for part in fit.parts]
+    pieces = [part.point.piece for part in fit.parts]
     mean, stderr = mean_heat_of(fit, effect)
     found = {name: value for name, (value, _) in values.items()}
     units = {p.name: p.unit for p in (setup.nominal.parameters if term is None else term.parameters)}
@@ -291,9 +290,9 @@ def mean_heat_of(fit: Fit, effect: Hypothesis) -> tuple[float, float]:
             for row in moved.tolist()]  # fmt: skip
     values = np.array([[row[name] for name in names] for row in rows])
     scope = scope_of(fit.experiment, effect)
-    acting = [scope is None or part.point.trajectory.piece.recording in scope for part in fit.parts]
+    acting = [scope is None or part.point.piece.recording in scope for part in fit.parts]
     steps = np.concatenate([
-        part.point.trajectory.piece.steps * acts for part, acts in zip(fit.parts, acting, strict=True)
+        part.point.piece.steps * acts for part, acts in zip(fit.parts, acting, strict=True)
     ])  # fmt: skip
     means = np.average(np.abs(np.concatenate(_heats_with(fit, effect, values))), axis=0, weights=steps)
     up, down = np.split(means[1:], 2)
@@ -304,7 +303,7 @@ def mean_heat_of(fit: Fit, effect: Hypothesis) -> tuple[float, float]:
 def _heats_with(fit: Fit, effect: Hypothesis, values: Array) -> list[Array]:
     """Heat with each row of `values`, the first as fitted, for its parameters; shape (K, rows) per piece, [W]."""
     experiment = fit.experiment
-    term, scope, result = TermOnGrid(experiment.machine.model, effect.added), scope_of(experiment, effect), []
+    term, scope, result = term_on_grid(experiment.machine.model, effect.added), scope_of(experiment, effect), []
     for part in fit.parts:
         trajectory = part.point.trajectory
         recording, here = trajectory.piece.recording, np.array(values)

@@ -120,7 +120,7 @@ def ratio_notes(fit: Fit) -> tuple[str, ...]:
     The information that they have along the common factor of all sizes is compared with what they have on the sizes
     one by one.
     """
-    direction = scale_direction(fit.experiment.machine.model.network, fit.experiment.unknowns)
+    direction = scale_direction(fit.experiment.network, fit.experiment.unknowns)
     each = np.concatenate([part.columns for part in fit.parts]) * direction
     together, alone = each.sum(axis=1), np.square(each).sum(axis=0)[direction != 0.0]
     if not len(alone) or float(together @ together) > LITTLE * float(alone.sum()):

@@ -278,9 +278,9 @@ class MeshContact:
         T_in = T_1[:, None] * weight_1 + T_2[:, None] * (1.0 - weight_1)
         eta_in, k_oil = self.oil.dynamic_viscosity(T_in), self.oil.conductivity(T_in)
         L = ehl.thermal_loading(eta=eta_in, beta=self.oil.thermoviscosity(T_in), V_e=V_e, k_oil=k_oil)
-        phi_T = self._reduction(p_H, L, V_s / V_e)
-        h = phi_T * self._film(F, eta_in, self.oil.film_pressure_viscosity_coefficient(T_in), V_e)
-        return Inlet(u_1=u_1, u_2=u_2, F=F, b_H=b_H, p_H=p_H, V_s=V_s, V_r=2.0 * V_e, h=h, phi_T=phi_T, T_in=T_in,
+        film = self._film(F, eta_in, self.oil.film_pressure_viscosity_coefficient(T_in), V_e)
+        h = self._reduction(p_H, L, V_s / V_e) * film
+        return Inlet(u_1=u_1, u_2=u_2, F=F, b_H=b_H, p_H=p_H, V_s=V_s, V_r=2.0 * V_e, h=h, T_in=T_in,
                      k_oil=k_oil)  # fmt: skip
 
     def _film(self, F: Array, eta: Array, alpha: Array, V_e: Array) -> Array:
@@ -324,8 +324,8 @@ class Inlet:
     F, b_H, p_H : Array
         Load per length of the line of contact times face width, of spur gears the normal force [N]; half width [m] and
         pressure [Pa] of Hertz
-    h, phi_T : Array
-        Film thickness [m], and its thermal reduction [-]
+    h : Array
+        Film thickness, thermal reduction included, [m]
     T_in, k_oil : Array
         Temperature [degC] and conductivity [W/(m K)] of the oil at the inlet
     """
@@ -338,7 +338,6 @@ class Inlet:
     V_s: Array
     V_r: Array
     h: Array
-    phi_T: Array
     T_in: Array
     k_oil: Array
 

@@ -62,8 +62,8 @@ class Anatomy:
         self.channels = experiment.pieces[0].channels
         self.parts = self.model.parts
         self.oil = OIL if OIL in self.parts else None
-        self.steps = np.concatenate([point.trajectory.piece.steps for point in points])
-        self.inputs = np.concatenate([point.trajectory.piece.inputs for point in points])
+        self.steps = np.concatenate([point.piece.steps for point in points])
+        self.inputs = np.concatenate([point.piece.inputs for point in points])
         self.names = experiment.machine.inputs
         self.random_heat_lasts = experiment.noise[0].goes_with_capacity
         self.conducting = [link for link in self.network.links if not link.conductance.is_zero]
@@ -121,7 +121,7 @@ class Anatomy:
         outside = self.temperatures[self.ambient] if self.ambient else T.min()
         rise = float(np.sqrt(self.mean(np.square(T - np.reshape(outside, (-1, 1))).mean(axis=1))))
         heat = float(self.mean(np.abs(self.sources_W).sum(axis=1)))
-        last = max(float(point.trajectory.piece.time[-1]) for point in self.points)
+        last = max(float(point.piece.time[-1]) for point in self.points)
         return Standard(
             coordinates=self.coordinates, warm=self.warm, largest=largest,
             drive=DRIVE_SHARE * max(largest[SPEED] if SPEED in self.coordinates else float(drive), 1e-6),

@@ -107,7 +107,7 @@ class View:
 
     def __init__(self, point: Point, standard: Standard) -> None:
         self.point, self.standard = point, standard
-        self.model, self.trajectory = point.machine.model, point.trajectory
+        self.model, self.trajectory, self.piece = point.machine.model, point.trajectory, point.piece
         network = self.model.network
         self.links = {link.name: index for index, link in enumerate(network.links)}
         self.sources = {source.name: index for index, source in enumerate(network.sources)}
@@ -133,7 +133,7 @@ class View:
 
     def input(self, name: str) -> Array:
         """Mean of an input over the intervals, shape (K,)."""
-        return np.asarray(self.trajectory.piece.inputs[:, self.point.machine.inputs.index(name)])
+        return np.asarray(self.piece.inputs[:, self.point.machine.inputs.index(name)])
 
     @cached_property
     def coordinates(self) -> Mapping[str, Array]:
@@ -255,12 +255,12 @@ class OwnTemperature:
 
 def _lagged_drive(view: View) -> Array:
     """By how much faster, or hotter, the machine ran before."""
-    middle = view.trajectory.piece.middle
+    middle = view.piece.middle
     change = (lagged(view.drive, np.diff(middle), LAG_S) - view.drive) / view.standard.drive
     return np.asarray(np.clip(change, -LAG_REACH, LAG_REACH))
 
 
-CONSTANT = Single(label="constant", values=lambda view: np.ones(len(view.trajectory.piece.steps)))
+CONSTANT = Single(label="constant", values=lambda view: np.ones(len(view.piece.steps)))
 LAGGED_DRIVE = Single(label="before", values=_lagged_drive)
-HOURS = Single(label="hours", values=lambda view: view.trajectory.piece.middle / view.standard.hours_s)
-AFTER_START = Single(label="after start", values=lambda view: np.exp(-view.trajectory.piece.middle / START_S))
+HOURS = Single(label="hours", values=lambda view: view.piece.middle / view.standard.hours_s)
+AFTER_START = Single(label="after start", values=lambda view: np.exp(-view.piece.middle / START_S))

@@ -131,7 +131,7 @@ class ModelError:
 
     def _chunks(self, point: Point) -> Iterator[tuple[int, int]]:
         """Ranges of so many unknowns as memory allows at once."""
-        size, count = columns_at_once(len(point.trajectory.piece.steps)), len(self.groups)
+        size, count = columns_at_once(len(point.piece.steps)), len(self.groups)
         return ((begin, min(begin + size, count)) for begin in range(0, count, size))
 
     def between(self, first: int, last: int) -> Iterator[tuple[Change, int, int]]:

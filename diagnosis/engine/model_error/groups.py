@@ -103,14 +103,14 @@ class Late:
     def __call__(self, view: View, channel: str) -> Array:
         """Along a piece, per share."""
         T = _followed(view, channel)
-        return np.asarray(lagged(T, view.trajectory.piece.steps, self.time) - T)
+        return np.asarray(lagged(T, view.piece.steps, self.time) - T)
 
 
 def _followed(view: View, channel: str, node: str | None = None) -> Array:
     """Temperature of a node, by default the sensor's own, as slow as the sensor follows it, shape (K + 1,), [degC]."""
     sensors, own = view.point.sensors, view.model.parts[view.model.part_index(channel)]
     T = view.temperature_at_points(node or own)
-    return lagged(T, view.trajectory.piece.steps, float(sensors.lag[sensors.channels.index(channel)]))
+    return lagged(T, view.piece.steps, float(sensors.lag[sensors.channels.index(channel)]))
 
 
 # ---------------------------------------------------------------------- base groups

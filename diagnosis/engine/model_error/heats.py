@@ -83,20 +83,20 @@ def core_heat(view: View, *, part: str, time: float) -> Heat:
     """Heat that a part does not take at once, since its core follows with a time constant [s]."""
     index = view.model.parts.index(part)
     T = view.trajectory.T[:, index]
-    return _into_part(view, index, _stored(view, index, T - lagged(T, view.trajectory.piece.steps, time)))
+    return _into_part(view, index, _stored(view, index, T - lagged(T, view.piece.steps, time)))
 
 
 def mass_heat(view: View, *, part: str, time: float) -> Heat:
     """Heat from a mass that follows a part with a time constant [s], through the mean conductance of the machine."""
     index = view.model.parts.index(part)
     T = view.trajectory.T[:, index]
-    ahead = T - lagged(T, view.trajectory.piece.steps, time)
+    ahead = T - lagged(T, view.piece.steps, time)
     return _into_part(view, index, -0.5 * view.standard.conductance * (ahead[1:] + ahead[:-1]))
 
 
 def torque_heat(view: View) -> Heat:
     """Heat per offset of the torque while the machine turns, as a share of the largest torque."""
-    samples, inputs = np.array(view.trajectory.piece.samples), view.point.machine.inputs
+    samples, inputs = np.array(view.piece.samples), view.point.machine.inputs
     turning = np.abs(samples[..., inputs.index(SPEED)]) > view.standard.coordinates[SPEED].floor
     samples[..., inputs.index(TORQUE)] += STEP * view.standard.largest[TORQUE] * turning
     return view.point.moved_heat(samples, STEP)
@@ -113,7 +113,7 @@ def offset_heat(view: View, *, name: str) -> Heat:
 
 
 def _nothing(view: View) -> tuple[Array, Array]:
-    count = len(view.trajectory.piece.steps)
+    count = len(view.piece.steps)
     return np.zeros((count, view.model.n + len(view.model.coupled))), np.zeros(count)
 
 
@@ -125,4 +125,4 @@ def _into_part(view: View, index: int, heat: Array) -> Heat:
 
 def _stored(view: View, index: int, T: Array) -> Array:
     """Heat [W] that the capacity of a part stores along temperatures at the grid points."""
-    return np.asarray(view.trajectory.capacities[index] * np.diff(T) / view.trajectory.piece.steps)
+    return np.asarray(view.trajectory.capacities[index] * np.diff(T) / view.piece.steps)
