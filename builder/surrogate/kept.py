@@ -1,12 +1,14 @@
-"""Networks of earlier builds: the same definition, settings, code and libraries are not trained twice.
+"""Networks of earlier builds: the same losses, settings, code and libraries are not trained twice.
 
-A correction is not part of the key. Its laws act on top of the losses that the networks have learnt.
+What only the thermal network has, as walls, links and factors, is not part of the key. Nor is a correction: its laws
+act on top of the losses that the networks have learnt.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+import pickle
 import platform
 from dataclasses import asdict, replace
 from datetime import datetime
@@ -92,7 +94,9 @@ def kept_or_trained(
 def _key(gearbox: Gearbox, preset: Preset, seed: int) -> str:
     """Hash of all that decides the weights, to their last bit."""
     made_of = {
-        "definition": gearbox.hash,
+        "losses": hashlib.sha256(pickle.dumps(gearbox.losses(), protocol=5)).hexdigest(),
+        "viscosity": gearbox.viscosity_constants,
+        "range": gearbox.training,
         "preset": asdict(preset),
         "seed": seed,
         "code": _code_hash(),

@@ -69,6 +69,8 @@ def test_a_kept_training_has_what_the_first_had(fzg: Gearbox, trainings: list[ob
     lambda _: {"preset": "default"},
     lambda _: {"gearbox": load_gearbox("conveyor")},
     lambda _: {"gearbox": load_gearbox("fzg").with_values({"oil.density_kg_m3": 870.0})},
+    lambda _: {"gearbox": load_gearbox("fzg").with_values({"stage.0.roughness_Ra_um": [0.2, 0.2]})},
+    lambda _: {"gearbox": load_gearbox("fzg").with_values({"training.speed_rpm": [1.0, 3000.0]})},
     lambda _: {"retrain": True},
     lambda patch: patch.setattr(kept, "_code_hash", lambda: "of other code") or {},
     lambda patch: patch.setattr(kept.metadata, "version", lambda _: "0.0") or {},
@@ -85,6 +87,28 @@ def test_another_definition_setting_code_or_library_is_trained(
     assert len(trainings) == 1
     kept_or_trained(**usual | change(monkeypatch))
     assert len(trainings) == 2
+
+
+@pytest.mark.parametrize("value", [
+    {"housing.wall_thickness_m": 0.03}, {"factors.churning": 2.0}, {"shaft.0.conductivity_W_mK": 40.0},
+    {"ambient.air_speed_m_s": 1.0}, {"name": "another rig"},
+])  # fmt: skip
+def test_what_the_losses_do_not_depend_on_is_not_trained_again(
+    value: dict[str, Any], fzg: Gearbox, trainings: list[object]
+) -> None:
+    kept_or_trained(fzg)
+    other = fzg.with_values(value)
+    found = kept_or_trained(other)
+    assert len(trainings) == 1 and other.hash != fzg.hash
+    assert (found.gearbox, found.definition_hash) == (other.name, other.hash)
+
+
+def test_what_was_computed_before_does_not_change_the_key() -> None:
+    gearbox, preset = load_gearbox("conveyor"), kept.chosen_preset("default")
+    key = kept._key(gearbox, preset, 0)
+    gearbox.losses_at(speed=1000.0, torque=100.0, temperatures=60.0)
+    gearbox.losses().power(1000.0, 100.0, np.full(len(gearbox.losses().temperature_nodes), 60.0))
+    assert kept._key(gearbox, preset, 0) == key
 
 
 def test_workers_and_the_order_in_which_libraries_are_found_change_nothing(
