@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from itertools import pairwise
 from typing import Annotated, Self
 
 from pydantic import Field, model_validator
@@ -53,7 +54,7 @@ RESERVED = (
     "gears",
 )
 SHARE_TOLERANCE = 1e-6
-STEPPED = 3.0  # ratio of diameters on one shaft
+STEPPED = 3.0  # ratio of diameters on one shaft, and of lengths along it
 WARM_DEGC = 60.0  # of all parts in full operation
 
 
@@ -158,8 +159,8 @@ class Definition(MachineDefinition):
         faults = faults or [*_chain(self)]
         faults = faults or [
             *_load_shares(self), *_taper_pairs(self), *_axial_loads(self), *_shafts_in_gears(self),
-            *_axis_heights(self), *_seals_on_shafts(self), *_gears_in_housing(self), *_oil_level(self),
-            *_oil_volume(self), *input_faults(self), *link_faults(self), *_added_to_geometry(self),
+            *_axis_heights(self), *_stations_of_shafts(self), *_places_along_shafts(self), *_gears_in_housing(self),
+            *_oil_level(self), *_oil_volume(self), *input_faults(self), *link_faults(self), *_added_to_geometry(self),
         ]  # fmt: skip
         if faults:
             raise ValueError("\n".join(faults))
@@ -341,16 +342,39 @@ def _axis_heights(definition: Definition) -> Iterator[str]:
             )
 
 
-def _seals_on_shafts(definition: Definition) -> Iterator[str]:
-    """Refuse seals that no station of their shaft can have."""
+def _stations_of_shafts(definition: Definition) -> Iterator[str]:
+    """Refuse seals and bearings that no station of their shaft can have."""
     diameters = {shaft.name: shaft.diameter_mm for shaft in definition.shaft}
-    for seal in definition.seal:
-        ratio = seal.diameter_mm / diameters[seal.shaft]
-        if not 1.0 / STEPPED < ratio < STEPPED:
+    stations = [(f"seal '{seal.name}'.diameter_mm", seal.diameter_mm, seal.shaft) for seal in definition.seal]
+    stations += [(f"bearing '{one.name}'.bore_mm", one.bore_mm, one.shaft) for one in definition.bearing]
+    for place, diameter, shaft in stations:
+        if not 1.0 / STEPPED < diameter / diameters[shaft] < STEPPED:
             yield (
-                f"seal '{seal.name}'.diameter_mm: {seal.diameter_mm:g} mm on a shaft of {diameters[seal.shaft]:g} mm; "
-                f"up to {STEPPED:g} times thicker or thinner is accepted"
+                f"{place}: {diameter:g} mm on a shaft of {diameters[shaft]:g} mm; up to {STEPPED:g} times thicker or "
+                "thinner is accepted"
             )
+
+
+def _places_along_shafts(definition: Definition) -> Iterator[str]:
+    """Refuse bearings much farther apart than their shaft is long, and gears that are in each other."""
+    for shaft in definition.shaft:
+        bearings = [bearing for bearing in definition.bearing if bearing.shaft == shaft.name]
+        places = [bearing.position_mm for bearing in bearings if bearing.position_mm is not None]
+        apart = max(places, default=0.0) - min(places, default=0.0)
+        if apart > STEPPED * shaft.length_mm:  # of a cylinder in place of the shaft
+            yield (
+                f"bearing: position_mm of those on '{shaft.name}' lie {apart:g} mm apart, and the shaft's length_mm is "
+                f"{shaft.length_mm:g}; up to {STEPPED:g} times as much is accepted"
+            )
+    for number, (before, after) in enumerate(pairwise(definition.stage), start=2):
+        if before.position_mm is not None and after.position_mm is not None:
+            apart = abs(after.position_mm[0] - before.position_mm[1])
+            needed = 0.5 * (before.face_width_mm + after.face_width_mm)
+            if apart < needed:
+                yield (
+                    f"stage #{number}.position_mm: '{after.names[0]}' is {apart:g} mm from '{before.names[1]}' on "
+                    f"'{after.driver}'; with their face widths they need {needed:g} mm"
+                )
 
 
 def _gears_in_housing(definition: Definition) -> Iterator[str]:

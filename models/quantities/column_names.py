@@ -11,6 +11,7 @@ UNIT_WORDS = frozenset({
     "deg", "degc", "c", "celsius", "k", "kelvin", "degf", "f", "w", "kw", "rpm", "nm", "m", "s", "ms", "mps", "km", "h",
     "kmh",
 })  # fmt: skip
+UNIT = re.compile(r"\s*[\[({][^\[({]*$")  # in brackets at the end of a name, known or not
 SHORT_FOR = {"amb": "ambient", "tamb": "ambient", "tambient": "ambient"}
 
 
@@ -35,6 +36,8 @@ def meant(name: str, lacking: Iterable[str], *, near: float, near_stem: float = 
     --------
     >>> meant("Temp_oil [K]", ["T_oil_degC", "T_ambient_degC"], near=0.9)
     'T_oil_degC'
+    >>> meant("T_ambient [degX]", ["T_ambient_degC"], near=0.9)
+    'T_ambient_degC'
     >>> meant("oil", ["T_oil_degC"], near=0.9), meant("oil", ["T_oil_degC"], near=0.9, with_kind=True)
     ('T_oil_degC', '')
     """
@@ -57,4 +60,4 @@ def _words(name: str) -> frozenset[str]:
 
 def _stem(name: str) -> str:
     """Return a name without kind and unit: ``ambient`` of ``T_ambient``, ``Temp_amb_C`` and ``ambient_degC``."""
-    return "".join(sorted(SHORT_FOR.get(word, word) for word in _words(name) - KIND_WORDS - UNIT_WORDS))
+    return "".join(sorted(SHORT_FOR.get(word, word) for word in _words(UNIT.sub("", name)) - KIND_WORDS - UNIT_WORDS))

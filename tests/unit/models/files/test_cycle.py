@@ -73,10 +73,11 @@ def test_all_faults_at_once_with_the_name_of_the_file() -> None:
     [
         *((name, "T_ambient_degC") for name in ("T_amb_degC", "T_ambient", "T_ambient_C", "T_ambient_K", "ambient_degC",
                                                 "Tamb_degC", "t_ambient_degc", "T_ambiant_degC", "Temp_ambient [K]",
-                                                "amb", "Tamb", "ambient", "ambint")),
+                                                "amb", "Tamb", "ambient", "ambint", "T_ambient [degX]")),
         *((name, "air_speed_m_s") for name in ("air_speed", "airspeed", "airspeed_m_s", "air_speed_mps",
                                                "Air_Speed_m_s")),
-        *((name, "valve_opening") for name in ("valve_openning", "Valve_opening", "valve_opening_m")),
+        *((name, "valve_opening") for name in ("valve_openning", "Valve_opening", "valve_opening_m",
+                                               "valve_opening (turns/min)")),
     ],
 )  # fmt: skip
 def test_an_optional_column_under_another_name_is_not_lost(name: str, meant: str) -> None:
