@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from diagnosis.proof.plant.anatomy import MESH, OIL, SPLASH, SUMP
-from diagnosis.proof.plant.plant import Moment, Plant
+from diagnosis.proof.plant.plant import Plant, PlantMoment
 from models.base.types import Array
 
 MEASUREMENT = "measurement"
@@ -98,7 +98,7 @@ class Grip:
         self.places = specimens[0].places
         names = specimens[0].parameters
         self.p = {name: np.array([specimen.parameters[name] for specimen in specimens]) for name in names}
-        self.moment: Moment
+        self.moment: PlantMoment
         self.row, self.rows = 0, rows
         self.made: dict[str, Array] = {}
         self.memory: dict[str, Array] = {}

@@ -12,7 +12,7 @@ from diagnosis.proof.plant.cycles import ROW_S, reference_torque
 from diagnosis.proof.plant.draws import at, either, one_of, relative
 from diagnosis.proof.plant.effect import MEASUREMENT, Concealed, Draw, Effect, Kind, Places
 from diagnosis.proof.plant.plant import Plant
-from diagnosis.proof.plant.plant_run import INPUTS, Outcome, Run
+from diagnosis.proof.plant.plant_run import INPUTS, PlantOutcome, PlantRun
 from models.base.types import Array
 from models.quantities.quantities import column_of_input
 
@@ -78,8 +78,8 @@ class Instruments:
 
 def record(
     plant: Plant,
-    run: Run,
-    outcome: Outcome,
+    run: PlantRun,
+    outcome: PlantOutcome,
     instruments: Instruments,
     faults: Sequence[Concealed],
     rng: np.random.Generator | None,
@@ -88,7 +88,7 @@ def record(
 
     Parameters
     ----------
-    outcome : Outcome
+    outcome : PlantOutcome
         What the plant did in it
     faults : sequence of Concealed
         Faults of measurement, of :data:`SENSOR_EFFECTS`

@@ -8,7 +8,7 @@ import numpy as np
 
 from diagnosis.proof.zoo import effects
 from diagnosis.proof.zoo.effects import Maker, ZooEffect, draft
-from diagnosis.proof.zoo.setting import Setting, pick, soft
+from diagnosis.proof.zoo.setting import EffectSetting, pick, soft
 from diagnosis.proof.zoo.structure import Law, Moment, constant
 from models.base.types import Array
 
@@ -17,7 +17,7 @@ makes = partial(effects.makes, family="outside the catalogue", table=OUTSIDE_MAK
 
 
 @makes("source")
-def bearing_torque_square(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def bearing_torque_square(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """A bearing that bends loses power with the square of torque."""
     x, y, node = s.speed(), s.load(), pick(s.group("bearings"), rng)
     act = s.heat(node, lambda m: y(m) ** 2 * x(m), is_loss=True)
@@ -25,7 +25,7 @@ def bearing_torque_square(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("source")
-def resonance(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def resonance(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """A narrow band of speed shakes one node."""
     x, x0, node = s.speed(), float(rng.uniform(0.2, 0.8)), pick(s.group("bearings"), rng)
     act = s.heat(node, lambda m: 1.0 / (1.0 + ((x(m) - x0) / (0.06 * x0)) ** 2), is_loss=True)
@@ -33,7 +33,7 @@ def resonance(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("source")
-def stick_slip(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def stick_slip(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """A support creaks below a speed and slides above it."""
     x, x0, node = s.speed(), float(rng.uniform(0.1, 0.3)), pick(s.group("bearings"), rng)
     act = s.heat(node, lambda m: soft((x0 - x(m)) / 0.01) * np.tanh(x(m) / 0.01), is_loss=True)
@@ -41,7 +41,7 @@ def stick_slip(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("source")
-def eddy_brake(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def eddy_brake(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """A stray field brakes a turning part: rises, then saturates."""
     x, x0 = s.speed(), float(rng.uniform(0.2, 0.5))
     node = s.group("gears" if s.groups.get("gears") else "bearings")[-1]
@@ -50,7 +50,7 @@ def eddy_brake(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("source")
-def stiff_grease(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def stiff_grease(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """Grease that stiffens at rest is sheared soft in every recording."""
     x, tau, node = s.speed(), float(rng.uniform(0.4, 2.0)), pick(s.group("bearings"), rng)
     act = s.heat(node, lambda m: np.sqrt(x(m)) * np.exp(-m.since_start / tau), is_loss=True)
@@ -58,7 +58,7 @@ def stiff_grease(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("source")
-def sludge(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def sludge(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """Sludge brakes below a temperature of the oil."""
     x, T, T0 = s.speed(), s.temperature("oil"), s.quantile("oil", float(rng.uniform(0.2, 0.6)))
     act = s.heat("oil", lambda m: np.sqrt(x(m)) * soft((T0 - T(m)) / 0.5), is_loss=True)
@@ -66,7 +66,7 @@ def sludge(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("source")
-def water_evaporation(s: Setting, _: np.random.Generator) -> ZooEffect:
+def water_evaporation(s: EffectSetting, _: np.random.Generator) -> ZooEffect:
     """Water boils out of the oil, steeply with its temperature."""
     T = s.temperature("oil")
     T0 = s.quantile("oil", 0.95)
@@ -75,7 +75,7 @@ def water_evaporation(s: Setting, _: np.random.Generator) -> ZooEffect:
 
 
 @makes("link_factor")
-def growing_insulation(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def growing_insulation(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """A layer that grows with the hours covers one way to the air."""
     tau, names = float(rng.uniform(0.05, 0.3)) * s.span, _way_to_air(s, rng)
     act = s.link_factor(names, lambda m: -(m.hours / tau) / (1.0 + m.hours / tau), sign=-1)
@@ -83,7 +83,7 @@ def growing_insulation(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("link_factor")
-def opening_gap(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def opening_gap(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """A gap opens in one link inside as it warms."""
     inside = [n for n in s.links if all(node in s.nodes for node in n.split("-"))]
     name = pick(inside, rng)
@@ -94,7 +94,7 @@ def opening_gap(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("link")
-def timed_neighbour(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def timed_neighbour(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """A machine next to it runs by a timer."""
     node, on = _outer(s, rng), _timer(rng)
     rise = 1.5 * s.rise
@@ -104,7 +104,7 @@ def timed_neighbour(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("source")
-def timed_heat(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def timed_heat(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """An auxiliary gives its heat to one part for a share of every period."""
     node, on = _outer(s, rng), _timer(rng)
     act = s.heat(node, on)
@@ -112,7 +112,7 @@ def timed_heat(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("link_factor")
-def door_draught(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def door_draught(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """A door opens by the clock: one way to the air conducts more."""
     names, on = _way_to_air(s, rng), _timer(rng)
     act = s.link_factor(names, on)
@@ -120,7 +120,7 @@ def door_draught(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("capacity")
-def melting_wax(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def melting_wax(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """A filling melts: capacity around its melting point."""
     node = _outer(s, rng)
     T, T0, width = s.temperature(node), s.quantile(node, float(rng.uniform(0.3, 0.7))), float(rng.uniform(1.0, 2.5))
@@ -129,7 +129,7 @@ def melting_wax(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("link")
-def heat_pipe(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def heat_pipe(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """A wet crack leads heat between two nodes that touch nowhere, once one is warm."""
     pairs = [
         (a, b)
@@ -145,7 +145,7 @@ def heat_pipe(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("link")
-def wet_floor(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def wet_floor(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """The lowest part stands on a floor that swings between day and night."""
     node, phase, T0 = s.nodes[0], float(rng.uniform(0.0, 1.0)), s.air_mean - float(rng.uniform(2.0, 8.0))
     floor: Law = lambda m: T0 + 5.0 * np.sin(2.0 * np.pi * (m.hours / 24.0 + phase))  # noqa: E731
@@ -168,10 +168,10 @@ def _timer(rng: np.random.Generator) -> _Timer:
     return _Timer(float(rng.uniform(0.7, 3.0)), float(rng.uniform(0.0, 1.0)))
 
 
-def _outer(s: Setting, rng: np.random.Generator) -> str:
+def _outer(s: EffectSetting, rng: np.random.Generator) -> str:
     """A node that touches the air, a housing part if there is one."""
     return pick(s.group("housing"), rng) if s.groups.get("housing") else pick(s.nodes, rng)
 
 
-def _way_to_air(s: Setting, rng: np.random.Generator) -> tuple[str, ...]:
+def _way_to_air(s: EffectSetting, rng: np.random.Generator) -> tuple[str, ...]:
     return (pick(s.link_between(s.nodes, ("air",)), rng),)

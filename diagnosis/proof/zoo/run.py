@@ -13,14 +13,14 @@ from scipy.signal import lfilter
 
 from diagnosis.proof.plant.cycles import Programme
 from diagnosis.proof.plant.integrator import sdirk_step
-from diagnosis.proof.zoo.laws import Acting, Balance, Laws, feel
-from diagnosis.proof.zoo.structure import Change, Moment, Variant, ZooPlant
+from diagnosis.proof.zoo.laws import Acting, ZooBalance, ZooLaws, feel
+from diagnosis.proof.zoo.structure import Moment, Variant, ZooChange, ZooPlant
 from models.base.types import Array
 
 LONGEST_STEP_S = 200.0
 
 
-class Clock:
+class RunClock:
     """Rows and steps of a programme.
 
     Attributes
@@ -50,12 +50,12 @@ class Clock:
 
 
 @dataclass(kw_only=True, eq=False)
-class Run:
+class ZooRun:
     """Everything of a batch at its rows, those before the recording included.
 
     Attributes
     ----------
-    changes : list of Change
+    changes : list of ZooChange
         The different ones of all variants
     T_steps : Array, shape (steps + 1, bodies, B)
         [degC]
@@ -66,9 +66,9 @@ class Run:
         changes; left through boundaries
     """
 
-    clock: Clock
-    laws: Laws
-    changes: list[Change]
+    clock: RunClock
+    laws: ZooLaws
+    changes: list[ZooChange]
     T_steps: Array
     made: list[Array]
     stored: Array
@@ -89,11 +89,11 @@ class Run:
         return moment, self.laws.values(moment)
 
 
-def integrate(plant: ZooPlant, programme: Programme, variants: Sequence[Variant]) -> Run:
+def integrate(plant: ZooPlant, programme: Programme, variants: Sequence[Variant]) -> ZooRun:
     """Integrate a batch."""
-    clock, B = Clock(plant, programme), len(variants)
+    clock, B = RunClock(plant, programme), len(variants)
     changes = list({id(change): change for variant in variants for change in variant.changes}.values())
-    laws = Laws(plant, [change for change in changes if change.kind == "bridge"])
+    laws = ZooLaws(plant, [change for change in changes if change.kind == "bridge"])
     acting: Acting = [
         (change, np.array([b for b, variant in enumerate(variants) if any(c is change for c in variant.changes)]))
         for change in changes
@@ -136,7 +136,9 @@ def integrate(plant: ZooPlant, programme: Programme, variants: Sequence[Variant]
     kept[-1] = T
     for kept_heat in made:
         kept_heat[-1] = kept_heat[-2] if clock.rows > 1 else 0.0
-    return Run(clock=clock, laws=laws, changes=changes, T_steps=kept, made=made, stored=stored, given=given, shed=shed)
+    return ZooRun(
+        clock=clock, laws=laws, changes=changes, T_steps=kept, made=made, stored=stored, given=given, shed=shed
+    )
 
 
 def _one_instant(m: Moment, k: int, *, T: Mapping[str, Array], p: Mapping[str, Array]) -> Moment:
@@ -166,7 +168,9 @@ def follow(seat: Array, lag_s: float, row_s: float) -> Array:
     return np.asarray(filtered)
 
 
-def _note_heat(laws: Laws, acting: Acting, balance: Balance, mean: Array, rate: Array, into: Sequence[Array]) -> None:
+def _note_heat(
+    laws: ZooLaws, acting: Acting, balance: ZooBalance, mean: Array, rate: Array, into: Sequence[Array]
+) -> None:
     """Write down what every change gave in a step, [W]."""
     where = {**balance.T, **dict(zip(laws.bodies, mean, strict=True))}
     for (change, _), made, row in zip(acting, balance.made, into, strict=True):

@@ -19,7 +19,7 @@ from diagnosis.proof.plant.effect import Concealed
 from diagnosis.proof.plant.instruments import lagged, record
 from diagnosis.proof.plant.integrator import sdirk_step
 from diagnosis.proof.plant.plant import Plant
-from diagnosis.proof.plant.plant_run import Individual, Outcome, Run, run_plant
+from diagnosis.proof.plant.plant_run import Individual, PlantOutcome, PlantRun, run_plant
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 
@@ -47,9 +47,9 @@ def programme(fzg: Gearbox) -> Programme:
     return Programme(name="train_1", inputs={"speed": speed, "torque": torque, **air})
 
 
-def run_of(programme: Programme, *effects: Concealed, start: float = 60.0, **random_heat: Array) -> Run:
+def run_of(programme: Programme, *effects: Concealed, start: float = 60.0, **random_heat: Array) -> PlantRun:
     driven = replace(programme, random_heat=random_heat, start=defaultdict(lambda: start))
-    return Run(individual=Individual(factors={}, reading=0), programme=driven, effects=effects)
+    return PlantRun(individual=Individual(factors={}, reading=0), programme=driven, effects=effects)
 
 
 def specimen(plant: Plant, name: str, **changed: float) -> Concealed:
@@ -60,7 +60,7 @@ def specimen(plant: Plant, name: str, **changed: float) -> Concealed:
 
 
 @pytest.fixture(scope="module")
-def with_effects(plant: Plant, programme: Programme) -> dict[str, tuple[Outcome, Outcome]]:
+def with_effects(plant: Plant, programme: Programme) -> dict[str, tuple[PlantOutcome, PlantOutcome]]:
     """Outcomes with and without every physical effect, from a warm or a cold start, all in one batch."""
     changed: dict[str, dict[str, float]] = {"resonance_loss": {"x": 0.6}, "stick_slip": {"x": 0.12}}
     starts = {name: 25.0 if name in ACT_ON_COLD else 70.0 for name in (*PHYSICS, *OUTSIDE)}
@@ -117,7 +117,7 @@ def test_plant_is_near_the_model_and_is_not_the_model(plant: Plant, fzg: Gearbox
 
 @pytest.mark.parametrize("name", [*PHYSICS, *OUTSIDE])
 def test_every_effect_acts_at_its_place(
-    name: str, plant: Plant, with_effects: dict[str, tuple[Outcome, Outcome]]
+    name: str, plant: Plant, with_effects: dict[str, tuple[PlantOutcome, PlantOutcome]]
 ) -> None:
     outcome, without = with_effects[name]
     assert np.isfinite(outcome.T).all()
@@ -129,7 +129,7 @@ def test_every_effect_acts_at_its_place(
 
 @pytest.mark.parametrize("name", PURE_SOURCES)
 def test_measured_loss_contains_mechanical_heat_only(
-    name: str, with_effects: dict[str, tuple[Outcome, Outcome]]
+    name: str, with_effects: dict[str, tuple[PlantOutcome, PlantOutcome]]
 ) -> None:
     outcome, _ = with_effects[name]
     heat = sum(outcome.heat[0].values())
