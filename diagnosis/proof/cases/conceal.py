@@ -26,9 +26,8 @@ from diagnosis.proof.plant.plant_run import EXPONENTS, ORDINARY_SPREAD, Individu
 from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.errors import InputError, did_you_mean
 
-EFFECTS: Mapping[str, Effect] = {e.name: e for e in (*LOSS_EFFECTS, *HEAT_EFFECTS, *SENSOR_EFFECTS, *OUTSIDE_EFFECTS)}
-PHYSICS = tuple(e.name for e in (*LOSS_EFFECTS, *HEAT_EFFECTS))
-OUTSIDE = tuple(e.name for e in OUTSIDE_EFFECTS)
+EFFECTS: Mapping[str, Effect] = {**LOSS_EFFECTS, **HEAT_EFFECTS, **SENSOR_EFFECTS, **OUTSIDE_EFFECTS}
+PHYSICS, OUTSIDE = (*LOSS_EFFECTS, *HEAT_EFFECTS), tuple(OUTSIDE_EFFECTS)
 MIX = {"control": 0.24, "single": 0.44, "double": 0.10, "sensor": 0.08, "outside": 0.10, "messy": 0.04}
 # The whole proof: every mechanism of the catalogue twice as a single.
 PROOF_MIX = {"control": 60, "single": 2 * len(PHYSICS), "double": 30, "messy": 30, "outside": 30, "sensor": 15}

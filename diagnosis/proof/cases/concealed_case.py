@@ -8,7 +8,7 @@ from diagnosis.proof.plant.effect import Concealed
 from diagnosis.proof.plant.instruments import SENSOR_EFFECTS, Instruments
 from diagnosis.proof.plant.plant_run import Individual, PlantRun
 
-FAULTS = tuple(e.name for e in SENSOR_EFFECTS)
+FAULTS = tuple(SENSOR_EFFECTS)
 CONTROLS = ("clean", "parameters_off", "parameter_far", "noise_misstated", "lag_wrong")
 
 

@@ -49,6 +49,29 @@ class Effect:
     catalogue: bool = True
 
 
+def acts(
+    kind: Kind, places: Places, draw: Draw, law: str, *,
+    family: str, table: dict[str, Effect], on_inputs: bool = False, before: Hook | None = None, catalogue: bool = True,
+) -> Callable[[Hook], Hook]:  # fmt: skip
+    """Enter the decorated function into a table of effects, under its name.
+
+    Parameters
+    ----------
+    on_inputs : bool
+        True if the function acts before the losses are known, see :class:`Effect`
+    before : callable or None
+        A second function, which does
+    """
+
+    def enter(hook: Hook) -> Hook:
+        name, hooks = hook.__name__, (hook, None) if on_inputs else (before, hook)
+        table[name] = Effect(name, kind, places, draw, law, family=family, before=hooks[0], after=hooks[1],
+                             catalogue=catalogue)  # fmt: skip
+        return hook
+
+    return enter
+
+
 @dataclass(frozen=True, kw_only=True)
 class Concealed:
     """One specimen of an effect: where it sits and how strong it is."""

@@ -212,7 +212,7 @@ def _fault(name: str, places: Places, draw: Draw, law: str, kind: Kind = "sensor
     return Effect(name, kind, places, draw, law, family=MEASUREMENT)
 
 
-SENSOR_EFFECTS = (
+SENSOR_EFFECTS: Mapping[str, Effect] = {effect.name: effect for effect in (
     _fault("sensor_bias", one_of(default_channels), either(2.0), "reading + a K"),
     _fault("sensor_drift", one_of(default_channels), either(0.15), "reading + a t^0.9 K, t in hours"),
     _fault("sensor_gain", one_of(default_channels), either(0.05), "reading + a (reading - 20 degC)"),
@@ -227,4 +227,4 @@ SENSOR_EFFECTS = (
     _fault("ambient_probe_offset", at("T_ambient"), either(2.0), "recorded ambient = true + a K", "signal"),
     _fault("ambient_probe_heated", at("T_ambient"), relative(0.07), "recorded ambient = true + a (housing - true)",
            "signal"),
-)  # fmt: skip
+)}  # fmt: skip

@@ -61,10 +61,9 @@ def test_a_bias_counts_and_a_torque_within_its_tolerance_does_not(
     plant: Plant, run: PlantRun, instruments: Instruments
 ) -> None:
     design = design_of_own_kind(plant, run.individual, [run], instruments)
-    kinds = {effect.name: effect for effect in SENSOR_EFFECTS}
 
     def nats(name: str, place: str, a: float) -> float:
-        fault = Concealed(effect=kinds[name], places=(place,), parameters={"a": a}, strength=1.0)
+        fault = Concealed(effect=SENSOR_EFFECTS[name], places=(place,), parameters={"a": a}, strength=1.0)
         return design.nats_of(effect_on_readings(plant, [run], instruments, [fault])).tool
 
     assert nats("sensor_bias", "oil", 0.1) < 0.5
@@ -75,7 +74,7 @@ def test_a_bias_counts_and_a_torque_within_its_tolerance_does_not(
 def test_a_wrong_recorded_input_counts_as_what_it_would_cause(
     plant: Plant, run: PlantRun, instruments: Instruments
 ) -> None:
-    kind = next(effect for effect in SENSOR_EFFECTS if effect.name == "ambient_probe_offset")
+    kind = SENSOR_EFFECTS["ambient_probe_offset"]
     fault = Concealed(effect=kind, places=("T_ambient",), parameters={"a": 2.0}, strength=1.0)
     x = effect_on_readings(plant, [run], instruments, [fault])[0]
     inputs = run.programme.inputs
