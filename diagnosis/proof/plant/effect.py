@@ -15,6 +15,7 @@ from models.base.types import Array
 MEASUREMENT = "measurement"
 Kind = Literal["source", "link", "loss_factor", "link_factor", "signal", "sensor", "parameter"]
 Hook = Callable[["Grip"], None]
+Spoil = Callable[["Concealed", "Recorded"], None]
 Places = Callable[[Plant, np.random.Generator], tuple[str, ...]]
 Draw = Callable[[Plant, np.random.Generator, float], Mapping[str, float]]
 
@@ -33,6 +34,10 @@ class Effect:
         The law in words and symbols, for the truth
     before, after : callable or None
         Act on the inputs before, and on heat and conductances after the losses are known
+    spoil : callable or None
+        Acts on what is recorded: of a fault of measurement
+    after_noise : bool
+        True if it acts on readings with noise and steps
     catalogue : bool
         Whether the diagnosis has a mechanism of this name
     """
@@ -46,6 +51,8 @@ class Effect:
     family: str
     before: Hook | None = None
     after: Hook | None = None
+    spoil: Spoil | None = None
+    after_noise: bool = False
     catalogue: bool = True
 
 
@@ -90,6 +97,26 @@ class Concealed:
     def key(self) -> str:
         """Specimens of one key act together."""
         return "@".join((self.effect.name, *self.places))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recorded:
+    """A recording on its way, which faults of measurement change.
+
+    Attributes
+    ----------
+    time : Array, shape (rows,)
+        [s]
+    housing : Array, shape (rows,)
+        True temperature of the last part of the housing, [degC]
+    inputs, readings : dict of str to Array, shape (rows,)
+        Recorded inputs by name, and temperatures by place, [degC]
+    """
+
+    time: Array
+    housing: Array
+    inputs: dict[str, Array]
+    readings: dict[str, Array]
 
 
 class Grip:
