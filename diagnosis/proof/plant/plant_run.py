@@ -83,17 +83,12 @@ class PlantOutcome:
         What the components of the loss model lose there, [W]
     heat : tuple of mapping of place to Array, shape (rows,)
         Heat [W] that each effect made in each place
-    stored, given, shed : float
-        Heat balance of the whole run, [J]: stored in the nodes, given by all sources, left through boundaries
     """
 
     T: Array
     P_loss: Array
     losses: Mapping[str, Array]
     heat: tuple[Mapping[str, Array], ...]
-    stored: float
-    given: float
-    shed: float
 
 
 def run_plant(
@@ -168,7 +163,6 @@ class _Batch:
         kept = np.empty((rows, B, len(anatomy.coarse)))
         lost = np.empty((rows, B))
         losses = {place: np.zeros((rows, B)) for place in map(self.plant.place_of, self.plant.components)}
-        balance = np.zeros((3, B))
         for row in range(rows):
             kept[row] = T @ anatomy.reading.T
             after = min(row + 1, rows - 1)
@@ -178,12 +172,12 @@ class _Batch:
             lost[row] = moment.lost
             for k, component in enumerate(self.plant.components):
                 losses[self.plant.place_of(component)][row] += moment.loss[:, k]
-            before, T = T, self._step(T, moment, balance)
+            before, T = T, self._step(T, moment)
             if progress is not None and row % 20 == 19:
                 progress(20 * B)
-        return [self._outcome(i, kept, lost, losses, balance[:, i]) for i in range(B)]
+        return [self._outcome(i, kept, lost, losses) for i in range(B)]
 
-    def _outcome(self, i: int, kept: Array, lost: Array, losses: Mapping[str, Array], balance: Array) -> PlantOutcome:
+    def _outcome(self, i: int, kept: Array, lost: Array, losses: Mapping[str, Array]) -> PlantOutcome:
         first = self.runs[i].programme.unrecorded
         heat: list[Mapping[str, Array]] = [{} for _ in self.runs[i].effects]
         for _, grip in self.grips:
@@ -194,28 +188,17 @@ class _Batch:
             P_loss=lost[first:, i],
             losses={place: values[first:, i] for place, values in losses.items()},
             heat=tuple(heat),
-            stored=float(balance[0]),
-            given=float(balance[1]),
-            shed=float(balance[2]),
         )
 
-    def _step(self, T: Array, moment: PlantMoment, balance: Array) -> Array:
-        """Temperatures after a step; adds what is stored, given and shed in it to `balance`, shape (3, B), [J]."""
+    def _step(self, T: Array, moment: PlantMoment) -> Array:
         plant, B, n = self.plant, len(T), self.n
         K = np.zeros((B, n, n))
         K[:, plant.a, plant.b] = K[:, plant.b, plant.a] = -moment.G
         K[:, np.arange(n), np.arange(n)] = moment.G @ plant.touching + moment.ground
-        boundary = list(plant.anatomy.boundary)
         T = T.copy()
-        T[:, boundary] = moment.air[:, None]
+        T[:, list(plant.anatomy.boundary)] = moment.air[:, None]
         heat = moment.heat + moment.ground_heat
-        new, mean = sdirk_step(T=T, capacity=moment.capacity, K=K, heat=heat, dt=ROW_S)
-        own = np.setdiff1d(np.arange(n), boundary)
-        balance[0] += (moment.capacity * (new - T))[:, own].sum(axis=1)
-        balance[1] += ROW_S * moment.heat.sum(axis=1)
-        for path in np.flatnonzero(np.isin(plant.b, boundary)):
-            balance[2] += ROW_S * moment.G[:, path] * (mean[:, plant.a[path]] - mean[:, plant.b[path]])
-        balance[2] += ROW_S * (moment.ground * mean - moment.ground_heat).sum(axis=1)
+        new, _ = sdirk_step(T=T, capacity=moment.capacity, K=K, heat=heat, dt=ROW_S)
         return np.asarray(new)
 
     def _moment(self, row: int, hours: Array, inputs: Mapping[str, Array], T: Array) -> PlantMoment:

@@ -61,9 +61,6 @@ class ZooRun:
         [degC]
     made : list of Array, shape (rows, B)
         Heat of every different change in the step after a row, [W]
-    stored, given, shed : Array, shape (B,)
-        Heat of the whole run, [J]: in the bodies at the end less that at the start; by sources, random heats and
-        changes; left through boundaries
     """
 
     clock: RunClock
@@ -71,9 +68,6 @@ class ZooRun:
     changes: list[ZooChange]
     T_steps: Array
     made: list[Array]
-    stored: Array
-    given: Array
-    shed: Array
 
     @property
     def T(self) -> Array:
@@ -107,7 +101,6 @@ def integrate(plant: ZooPlant, programme: Programme, variants: Sequence[Variant]
     T = np.repeat(np.array([[programme.start[name]] for name in laws.bodies]), B, axis=1)
     before = T
     kept, made = np.empty((clock.steps + 1, n, B)), [np.zeros((clock.rows, B)) for _ in changes]
-    stored, given, shed = np.zeros(B), np.zeros(B), np.zeros(B)
     steady = np.empty(0)
     fresh: list[int] = []
     for step in range(clock.steps):
@@ -121,24 +114,16 @@ def integrate(plant: ZooPlant, programme: Programme, variants: Sequence[Variant]
         balance = laws.balance(moment, laws.values(moment, held=steady, fresh=fresh), acting)
         for name, watts in clock.random_heat.items():
             balance.q[laws.body[name]] += watts[step] * loud
-        inflow = laws.heat_from_boundaries(balance)
-        K = laws.matrix(balance.G)
-        new, mean = sdirk_step(T=T.T, capacity=balance.C.T, K=K, heat=(balance.q + inflow).T, dt=clock.dt)
+        heat = balance.q + laws.heat_from_boundaries(balance)
+        new, mean = sdirk_step(T=T.T, capacity=balance.C.T, K=laws.matrix(balance.G), heat=heat.T, dt=clock.dt)
         new, mean = new.T, mean.T
-        stored += (balance.C * (new - T)).sum(axis=0)
-        given += clock.dt * balance.q.sum(axis=0)
-        for path, body, _ in laws.from_boundary:
-            shed += clock.dt * balance.G[path] * mean[body]
-        shed -= clock.dt * inflow.sum(axis=0)
         if part == 0:
             _note_heat(laws, acting, balance, mean, (new - T) / clock.dt, [kept_heat[row] for kept_heat in made])
         before, T = T, new
     kept[-1] = T
     for kept_heat in made:
         kept_heat[-1] = kept_heat[-2] if clock.rows > 1 else 0.0
-    return ZooRun(
-        clock=clock, laws=laws, changes=changes, T_steps=kept, made=made, stored=stored, given=given, shed=shed
-    )
+    return ZooRun(clock=clock, laws=laws, changes=changes, T_steps=kept, made=made)
 
 
 def _one_instant(m: Moment, k: int, *, T: Mapping[str, Array], p: Mapping[str, Array]) -> Moment:

@@ -14,6 +14,7 @@ from scipy.linalg import expm
 import diagnosis.proof
 from diagnosis.proof.cases.conceal import EFFECTS, OUTSIDE, PHYSICS, draw_case
 from diagnosis.proof.cases.concealed_case import FAULTS, Plan
+from diagnosis.proof.plant import plant_run
 from diagnosis.proof.plant.cycles import ROW_S, Programme, reference_torque, top_speed
 from diagnosis.proof.plant.effect import Concealed
 from diagnosis.proof.plant.instruments import lagged, record
@@ -92,13 +93,26 @@ def test_integrator_is_of_second_order_and_keeps_the_heat() -> None:
     np.testing.assert_allclose(C * (new - start), 10.0 * (heat - np.einsum("bij,bj->bi", K, mean)), rtol=1e-9)
 
 
-def test_heat_balance_closes(plant: Plant, programme: Programme) -> None:
-    heat = 5.0 * np.sin(np.arange(len(programme)))
+def test_heat_balance_closes(plant: Plant, programme: Programme, monkeypatch: pytest.MonkeyPatch) -> None:
     names = ("cooler_thermostat", "oil_added", "shaft_ends_to_air", "run_in_flanks", "phase_change")
-    runs = [run_of(programme, specimen(plant, name), oil=heat) for name in names]
-    for name, outcome in zip(names, run_plant(plant, runs), strict=True):
-        assert outcome.given > 1e6, name
-        assert outcome.stored == pytest.approx(outcome.given - outcome.shed, abs=1e-6 * outcome.given), name
+    stored, given, shed = np.zeros((3, len(names)))
+    boundary = list(plant.anatomy.boundary)
+    own = np.setdiff1d(np.arange(len(plant.anatomy.nodes)), boundary)
+
+    def step(*, T: Array, capacity: Array, K: Array, heat: Array, dt: float) -> tuple[Array, Array]:
+        new, mean = sdirk_step(T=T, capacity=capacity, K=K, heat=heat, dt=dt)
+        stored[:] += (capacity * (new - T))[:, own].sum(axis=1)
+        given[:] += dt * heat.sum(axis=1)
+        shed[:] += dt * (K.sum(axis=2) * mean).sum(axis=1)
+        for node in boundary:
+            shed[:] -= dt * (K[:, own, node] * (mean[:, own] - mean[:, [node]])).sum(axis=1)
+        return new, mean
+
+    monkeypatch.setattr(plant_run, "sdirk_step", step)
+    heat = 5.0 * np.sin(np.arange(len(programme)))
+    run_plant(plant, [run_of(programme, specimen(plant, name), oil=heat) for name in names])
+    assert np.all(given > 1e6)
+    assert np.all(np.abs(stored - given + shed) < 1e-6 * given)
 
 
 def test_plant_is_near_the_model_and_is_not_the_model(plant: Plant, fzg: Gearbox, programme: Programme) -> None:
