@@ -9,8 +9,7 @@ import numpy as np
 from diagnosis.proof.zoo import effects
 from diagnosis.proof.zoo.effects import Maker, ZooEffect, draft
 from diagnosis.proof.zoo.setting import EffectSetting, pick, soft
-from diagnosis.proof.zoo.structure import Law, Moment, constant
-from models.base.types import Array
+from diagnosis.proof.zoo.structure import Law, constant
 
 OUTSIDE_MAKERS: dict[str, Maker] = {}
 makes = partial(effects.makes, family="outside the catalogue", table=OUTSIDE_MAKERS)
@@ -96,27 +95,27 @@ def opening_gap(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
 @makes("link")
 def timed_neighbour(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """A machine next to it runs by a timer."""
-    node, on = _outer(s, rng), _timer(rng)
+    node, (on, timer) = _outer(s, rng), _timer(rng)
     rise = 1.5 * s.rise
     warm: Law = lambda m: m.inputs["T_ambient"] + rise * on(m)  # noqa: E731
     act = s.bridge(node, "timed neighbour", constant(1.0), parts=s.boundary("timed neighbour", warm))
-    return draft(act, "a to a neighbour that runs by a timer", 0.4 * s.shed, rise_K=rise, **on.parameters)
+    return draft(act, "a to a neighbour that runs by a timer", 0.4 * s.shed, rise_K=rise, **timer)
 
 
 @makes("source")
 def timed_heat(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """An auxiliary gives its heat to one part for a share of every period."""
-    node, on = _outer(s, rng), _timer(rng)
+    node, (on, timer) = _outer(s, rng), _timer(rng)
     act = s.heat(node, on)
-    return draft(act, "a for 40 % of every period", 0.4 * s.loss, **on.parameters)
+    return draft(act, "a for 40 % of every period", 0.4 * s.loss, **timer)
 
 
 @makes("link_factor")
 def door_draught(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """A door opens by the clock: one way to the air conducts more."""
-    names, on = _way_to_air(s, rng), _timer(rng)
+    names, (on, timer) = _way_to_air(s, rng), _timer(rng)
     act = s.link_factor(names, on)
-    return draft(act, "conductance to air (1 + a) for 40 % of every period", 2.0, **on.parameters)
+    return draft(act, "conductance to air (1 + a) for 40 % of every period", 2.0, **timer)
 
 
 @makes("capacity")
@@ -153,19 +152,11 @@ def wet_floor(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     return draft(act, "a to T0 + 5 sin(2 pi (t / 24 h + phase))", 0.4 * s.shed, T0=T0, phase=phase)
 
 
-class _Timer:
-    """1 for 40 % of every period, 0 else."""
-
-    def __init__(self, period_h: float, phase: float) -> None:
-        self.parameters = {"period_h": period_h, "phase": phase}
-
-    def __call__(self, m: Moment) -> Array:
-        p = self.parameters
-        return np.asarray(np.mod(m.hours / p["period_h"] + p["phase"], 1.0) < 0.4, dtype=float)
-
-
-def _timer(rng: np.random.Generator) -> _Timer:
-    return _Timer(float(rng.uniform(0.7, 3.0)), float(rng.uniform(0.0, 1.0)))
+def _timer(rng: np.random.Generator) -> tuple[Law, dict[str, float]]:
+    """1 for 40 % of every period, 0 else; and the period and phase drawn."""
+    period_h, phase = float(rng.uniform(0.7, 3.0)), float(rng.uniform(0.0, 1.0))
+    law: Law = lambda m: np.asarray(np.mod(m.hours / period_h + phase, 1.0) < 0.4, dtype=float)  # noqa: E731
+    return law, {"period_h": period_h, "phase": phase}
 
 
 def _outer(s: EffectSetting, rng: np.random.Generator) -> str:
