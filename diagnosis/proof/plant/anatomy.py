@@ -128,11 +128,10 @@ class PlantAnatomy:
 
     def _housing_paths(self) -> Iterator[PlantPath]:
         housing = self.gearbox.housing
-        area = 0.5 * (housing.inside_area_m2 + housing.outside_area_m2)
         wetted = 0.0
         for index, part in enumerate(housing.part):
             name, share = part.name, part.area_fraction
-            wall = housing.conductivity_W_mK * area * share / housing.wall_thickness_m
+            wall = housing.conductivity_W_mK * self.sizes.wall_area * share / housing.wall_thickness_m
             film = housing.oil_heat_transfer_W_m2K * housing.inside_area_m2 * share
             wetted += film
             # The lowest part is wetted by the sump, the others by what the gears throw.
