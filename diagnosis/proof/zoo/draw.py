@@ -10,7 +10,7 @@ import numpy as np
 from diagnosis.proof.cases.time_course import ALWAYS, TimeCourse
 from diagnosis.proof.plant.cycles import BASELINE, HOLD, TRAIN
 from diagnosis.proof.zoo.case import CONTROLS, NatsOf, ZooCase, ZooPlan, nats_of_case, run_case
-from diagnosis.proof.zoo.distance import Drawn, draw_plant
+from diagnosis.proof.zoo.distance import draw_plant
 from diagnosis.proof.zoo.effects import Maker, ZooEffect
 from diagnosis.proof.zoo.effects_dates import DATED_MAKERS, draw_course
 from diagnosis.proof.zoo.effects_heat import HEAT_MAKERS
@@ -23,7 +23,7 @@ from diagnosis.proof.zoo.recorder import draw_instruments, with_slow_sensors
 from diagnosis.proof.zoo.setting import EffectSetting, UnfitError, either, pick
 from diagnosis.proof.zoo.simulate import simulate
 from diagnosis.proof.zoo.structure import Variant
-from models.assembly.gearbox import Gearbox, load_gearbox
+from models.assembly.gearbox import load_gearbox
 from models.base.errors import InputError
 
 CATALOGUE_MAKERS: Mapping[str, Maker] = {**LOSS_MAKERS, **HEAT_MAKERS}
@@ -60,13 +60,7 @@ def draw_case(
         If the family is not known, or the definition cannot be split.
     """
     drawn = draw_plant(find_family(plan.family), plan.machine, plan.seed, baselines=baselines)
-    return draw_case_of(drawn, load_gearbox(plan.machine), plan, name=name, session_deviation=session_deviation)
-
-
-def draw_case_of(
-    drawn: Drawn, gearbox: Gearbox, plan: ZooPlan, *, name: str, session_deviation: float | None
-) -> ZooCase:
-    """Draw what is concealed in a plant, and simulate its recordings; arguments as of :func:`draw_case`."""
+    gearbox = load_gearbox(plan.machine)
     effects_rng, strength_rng, session_rng, instruments_rng = (
         np.random.default_rng([plan.seed, 7, k]) for k in range(4)
     )
