@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from diagnosis.proof.zoo.structure import Body, Boundary, Law, Moment, Path, Probe, Source, ZooPlant
+from diagnosis.proof.zoo.structure import Body, Boundary, HeatPath, Law, Moment, Probe, Source, ZooPlant
 from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError
 from models.base.types import Array
@@ -89,7 +89,7 @@ class Draft:
         self.family, self.gearbox, self.inputs, self.links, self.rng = family, gearbox, inputs, set(links), rng
         self.bodies: dict[str, Body] = {}
         self.boundaries: dict[str, Boundary] = {}
-        self.paths: list[Path] = []
+        self.paths: list[HeatPath] = []
         self.sources: list[Source] = []
         self.probes: list[Probe] = []
         self.parameters: dict[str, float] = {}
@@ -145,7 +145,7 @@ class Draft:
 
     def path(self, a: str, b: str, part_of: str, conductance: Law) -> None:
         """Add a way for heat."""
-        self.paths.append(Path(name=f"{a}-{b}", ends=(a, b), conductance=conductance, part_of=part_of))
+        self.paths.append(HeatPath(name=f"{a}-{b}", ends=(a, b), conductance=conductance, part_of=part_of))
 
     def source(
         self, name: str, part_of: str, power: Law, spread: Sequence[tuple[str, float]], *, is_loss: bool = True

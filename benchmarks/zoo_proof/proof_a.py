@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from diagnosis.proof.zoo.families.family import Family
+from diagnosis.proof.zoo.families.family import PlantFamily
 from diagnosis.proof.zoo.structure import Law, Moment, ZooPlant
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
@@ -23,7 +23,7 @@ def draw(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
     return _Machine(Box(gearbox), rng).plant()
 
 
-FAMILY = Family(name="proof_a", description="kept for proof", machines=("fzg", "conveyor"), draw=draw)
+FAMILY = PlantFamily(name="proof_a", description="kept for proof", machines=("fzg", "conveyor"), draw=draw)
 
 
 class _Machine:

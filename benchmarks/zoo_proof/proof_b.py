@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from diagnosis.proof.zoo.families.family import Family
+from diagnosis.proof.zoo.families.family import PlantFamily
 from diagnosis.proof.zoo.structure import Law, Moment, ZooPlant
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
@@ -33,7 +33,7 @@ def draw(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
     return draw_without_geometry(gearbox, rng) if gearbox.is_parametric else _Machine(Box(gearbox), rng).plant()
 
 
-FAMILY = Family(
+FAMILY = PlantFamily(
     name="proof_b",
     description="kept for proof",
     machines=("fzg", "conveyor", "heated_rod", "la_haute_borne"),

@@ -17,7 +17,7 @@ from models.assembly.gearbox import load_gearbox
 from models.base.errors import InputError
 
 if TYPE_CHECKING:
-    from diagnosis.proof.scoring.lines import Settings
+    from diagnosis.proof.scoring.lines import ProofSettings
 
 MADE = ("plant", "cases", "seed", "families", "removed")  # options of cases that are made
 REAL = ("rod",)  # plants with a recording in examples/data
@@ -74,7 +74,7 @@ def prove(
         return
     with progress(LOADING):
         from builder.workflows.prove import prove as run
-        from diagnosis.proof.scoring.lines import Settings, begin_lines
+        from diagnosis.proof.scoring.lines import ProofSettings, begin_lines
 
     if (recordings is None) != (truth is None):
         raise InputError("--recordings and --truth go together: a folder per case, and what is concealed in them")
@@ -91,7 +91,7 @@ def prove(
             raise InputError(f"--{_dashed(wrong[0])} is for cases that are made; --recordings names cases that exist")
         load_gearbox(gearbox or "fzg")
         file = answers or output / "given.jsonl"
-        begin_lines(file, Settings(plant="given", gearbox=gearbox or "fzg", cells_every=cells_every,
+        begin_lines(file, ProofSettings(plant="given", gearbox=gearbox or "fzg", cells_every=cells_every,
                                    baselines=baselines))  # fmt: skip
     else:
         settings = _settings_of_made(plant, cases, seed, gearbox=gearbox, families=families, cells_every=cells_every,
@@ -138,11 +138,11 @@ def score(results: Path, truth: Path, gearbox: str, output: Path) -> None:
 def _settings_of_made(
     plant: Literal["own", "zoo"], cases: int | None, seed: int | None, *, gearbox: str | None, families: str,
     cells_every: int, baselines: int, removed: bool,
-) -> Settings:  # fmt: skip
+) -> ProofSettings:  # fmt: skip
     """Settings of a proof with cases that are made; refuses what does not fit the kind of plant."""
     from builder.workflows.proof_cases import ZOO_COUNTS
     from diagnosis.proof.cases.conceal import PROOF_MIX, mix_of
-    from diagnosis.proof.scoring.lines import Settings
+    from diagnosis.proof.scoring.lines import ProofSettings
     from diagnosis.proof.scoring.seeds import OWN_PROOF, ZOO_PROOF
 
     if plant == "own" and families:
@@ -153,7 +153,7 @@ def _settings_of_made(
         raise InputError("--baselines is for --plant zoo and --recordings; the own plant records no baselines")
     mix, chosen, machine = (PROOF_MIX, OWN_PROOF, "fzg") if plant == "own" else (ZOO_COUNTS, ZOO_PROOF[0], "")
     number = sum(mix_of(cases or sum(mix.values()), mix).values())  # refuses too few
-    return Settings(plant=plant, seed=chosen if seed is None else seed, cases=number, gearbox=gearbox or machine,
+    return ProofSettings(plant=plant, seed=chosen if seed is None else seed, cases=number, gearbox=gearbox or machine,
                     families=families, cells_every=cells_every, baselines=baselines, removed=removed)  # fmt: skip
 
 

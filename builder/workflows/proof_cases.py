@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from diagnosis.proof.cases.case_files import case_names, write_case, write_cases
 from diagnosis.proof.cases.conceal import conceal_set, draw_case, mix_of, mixed_plans
-from diagnosis.proof.scoring.lines import Settings
+from diagnosis.proof.scoring.lines import ProofSettings
 from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.atomic_write import atomic_file, atomic_folder
 from models.base.errors import InputError
@@ -26,7 +26,7 @@ ZOO_COUNTS = {"control": 20, "single": 13, "date": 9, "sensor": 6, "pair": 5, "o
 ZOO_BASELINES = 2  # that every case of the zoo has, whether or not its diagnosis gets them
 
 
-def keep_to_one_set(settings: Settings, file: Path) -> None:
+def keep_to_one_set(settings: ProofSettings, file: Path) -> None:
     """Write down which cases a folder holds.
 
     Raises
@@ -42,7 +42,7 @@ def keep_to_one_set(settings: Settings, file: Path) -> None:
         raise InputError(f"{file.parent}: holds the cases of another proof; choose another output folder")
 
 
-def make_cases(settings: Settings, recordings: Path, truth: Path, jobs: int, progress: Progress) -> dict[str, str]:
+def make_cases(settings: ProofSettings, recordings: Path, truth: Path, jobs: int, progress: Progress) -> dict[str, str]:
     """Make the recordings and truths of a seed, unless they are there.
 
     Returns
@@ -85,7 +85,7 @@ def make_zoo_case(name: str, plan: ZooPlan, recordings: Path, truth: Path, basel
     write_case(files_of_case(draw_case(plan, name=name, baselines=baselines)), recordings / name, truth)
 
 
-def add_evidence(settings: Settings, truth: Path, jobs: int, progress: Progress) -> None:
+def add_evidence(settings: ProofSettings, truth: Path, jobs: int, progress: Progress) -> None:
     """Add what the recordings hold for each effect to the truths of the own kind that lack it, a minute per case."""
     gearbox, plans = load_gearbox(settings.gearbox), mixed_plans(settings.seed, mix_of(settings.cases))
     work = [

@@ -22,11 +22,11 @@ from builder.workflows.prove import BLIND, HASHES, diagnose, environment, prove
 from diagnosis.proof.cases.conceal import WHOLE
 from diagnosis.proof.plant import cycles
 from diagnosis.proof.scoring import lines, seeds, truth
-from diagnosis.proof.scoring.lines import Settings, Task
+from diagnosis.proof.scoring.lines import ProofSettings, Task
 from models.assembly.gearbox import known_gearboxes
 from models.base.errors import InputError
 
-SETTINGS = Settings(plant="own", seed=77, cases=6)
+SETTINGS = ProofSettings(plant="own", seed=77, cases=6)
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -99,7 +99,7 @@ def test_a_proof_of_the_own_plant(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     }  # fmt: skip
     seen.clear()
     assert prove(file, output) == result and not seen
-    lines.begin_lines(tmp_path / "78.jsonl", Settings(plant="own", seed=78, cases=6))
+    lines.begin_lines(tmp_path / "78.jsonl", ProofSettings(plant="own", seed=78, cases=6))
     with pytest.raises(InputError, match="holds the cases of another proof"):
         prove(tmp_path / "78.jsonl", output)
 
@@ -129,7 +129,7 @@ def test_a_proof_of_the_zoo_is_continued_while_its_cases_are_made(
 
     monkeypatch.setattr(proof_cases, "make_zoo_case", make)
     monkeypatch.setattr(driver, "diagnose", look)
-    lines.begin_lines(tmp_path / "35.jsonl", Settings(plant="zoo", seed=35, cases=7, gearbox=""))
+    lines.begin_lines(tmp_path / "35.jsonl", ProofSettings(plant="zoo", seed=35, cases=7, gearbox=""))
     with pytest.raises(KeyboardInterrupt):
         prove(tmp_path / "35.jsonl", output)
     result = prove(tmp_path / "35.jsonl", output)
@@ -141,7 +141,7 @@ def test_failures_count_and_other_code_or_recordings_are_refused(
     given: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file, output = tmp_path / "given.jsonl", tmp_path / "out"
-    lines.begin_lines(file, Settings(plant="given"))
+    lines.begin_lines(file, ProofSettings(plant="given"))
     with pytest.raises(InputError, match="name them with --recordings and --truth"):
         prove(file, output)
     monkeypatch.setattr(driver, "diagnose", lambda t, *w: diagnose(t, *w) if t.case == "a" else silent(t, *w))

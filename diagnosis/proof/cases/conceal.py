@@ -22,13 +22,12 @@ from diagnosis.proof.plant.effects_losses import LOSS_EFFECTS
 from diagnosis.proof.plant.effects_outside import OUTSIDE_EFFECTS
 from diagnosis.proof.plant.instruments import SENSOR_EFFECTS, Instruments, default_channels, record
 from diagnosis.proof.plant.plant import READINGS, Plant
-from diagnosis.proof.plant.plant_run import EXPONENTS, ORDINARY_SPREAD, Individual, Run, factor_sd, run_plant
+from diagnosis.proof.plant.plant_run import EXPONENTS, ORDINARY_SPREAD, Individual, PlantRun, factor_sd, run_plant
 from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.errors import InputError, did_you_mean
 
-EFFECTS: Mapping[str, Effect] = {e.name: e for e in (*LOSS_EFFECTS, *HEAT_EFFECTS, *SENSOR_EFFECTS, *OUTSIDE_EFFECTS)}
-PHYSICS = tuple(e.name for e in (*LOSS_EFFECTS, *HEAT_EFFECTS))
-OUTSIDE = tuple(e.name for e in OUTSIDE_EFFECTS)
+EFFECTS: Mapping[str, Effect] = {**LOSS_EFFECTS, **HEAT_EFFECTS, **SENSOR_EFFECTS, **OUTSIDE_EFFECTS}
+PHYSICS, OUTSIDE = (*LOSS_EFFECTS, *HEAT_EFFECTS), tuple(OUTSIDE_EFFECTS)
 MIX = {"control": 0.24, "single": 0.44, "double": 0.10, "sensor": 0.08, "outside": 0.10, "messy": 0.04}
 # The whole proof: every mechanism of the catalogue twice as a single.
 PROOF_MIX = {"control": 60, "single": 2 * len(PHYSICS), "double": 30, "messy": 30, "outside": 30, "sensor": 15}
@@ -265,7 +264,7 @@ def _individual(plant: Plant, plan: Plan, rng: np.random.Generator) -> Individua
     )
 
 
-def _run(plant: Plant, individual: Individual, programme: Programme, rng: np.random.Generator) -> Run:
+def _run(plant: Plant, individual: Individual, programme: Programme, rng: np.random.Generator) -> PlantRun:
     rows = len(programme)
     air = ambient(rows, rng)
     restless = rng.choice(plant.anatomy.coarse, int(rng.integers(2, 4)), replace=False)
@@ -276,7 +275,7 @@ def _run(plant: Plant, individual: Individual, programme: Programme, rng: np.ran
     inputs = {**programme.inputs, "T_ambient": air, "air_speed": np.full(rows, plant.gearbox.ambient.air_speed_m_s)}
     start = dict.fromkeys(plant.anatomy.nodes, float(air[0] + rng.normal(0.0, 0.5)))
     driven = replace(programme, inputs=inputs, random_heat=random_heat, start=start)
-    return Run(individual=individual, programme=driven)
+    return PlantRun(individual=individual, programme=driven)
 
 
 def _instruments(plant: Plant, plan: Plan, rng: np.random.Generator) -> Instruments:

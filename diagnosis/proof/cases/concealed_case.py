@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 from diagnosis.proof.plant.effect import Concealed
 from diagnosis.proof.plant.instruments import SENSOR_EFFECTS, Instruments
-from diagnosis.proof.plant.plant_run import Individual, Run
+from diagnosis.proof.plant.plant_run import Individual, PlantRun
 
-FAULTS = tuple(e.name for e in SENSOR_EFFECTS)
+FAULTS = tuple(SENSOR_EFFECTS)
 CONTROLS = ("clean", "parameters_off", "parameter_far", "noise_misstated", "lag_wrong")
 
 
@@ -44,7 +44,7 @@ class ConcealedCase:
     individual: Individual
     effects: tuple[Concealed, ...]
     instruments: Instruments
-    runs: tuple[Run, ...]
+    runs: tuple[PlantRun, ...]
 
     @property
     def physics(self) -> tuple[Concealed, ...]:

@@ -15,7 +15,7 @@ FORMS: tuple[Form, ...] = ("step", "ramp", "from_to")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Course:
+class TimeCourse:
     """How much of an effect acts at a time.
 
     Attributes
@@ -47,4 +47,4 @@ class Course:
         return np.asarray((time >= self.begins) & ((time < self.ends) | (self.kind == "step")), dtype=float)
 
 
-ALWAYS = Course()
+ALWAYS = TimeCourse()

@@ -13,7 +13,7 @@ from diagnosis.proof.plant.cycles import HOLD, TRAIN, Programme
 from diagnosis.proof.plant.effect import Concealed
 from diagnosis.proof.plant.instruments import Instruments, record
 from diagnosis.proof.plant.plant import Plant
-from diagnosis.proof.plant.plant_run import Outcome, factor_sd
+from diagnosis.proof.plant.plant_run import PlantOutcome, factor_sd
 from models.base.types import Array
 
 SCHEMA = 1
@@ -21,12 +21,14 @@ SETS = (TRAIN, HOLD)
 FAR_CONTROL = "parameter_far"
 
 
-def truth_of(plant: Plant, case: ConcealedCase, by_twin: Mapping[tuple[int, ...], Sequence[Outcome]]) -> dict[str, Any]:
+def truth_of(
+    plant: Plant, case: ConcealedCase, by_twin: Mapping[tuple[int, ...], Sequence[PlantOutcome]]
+) -> dict[str, Any]:
     """The truth of a case, ready for JSON.
 
     Parameters
     ----------
-    by_twin : mapping of tuple of int to sequence of Outcome
+    by_twin : mapping of tuple of int to sequence of PlantOutcome
         Outcome of every recording by which effects act (see :func:`diagnosis.proof.cases.conceal.twins`)
 
     Returns
@@ -115,7 +117,7 @@ def _effect(effect: Concealed, case: ConcealedCase) -> dict[str, Any]:
     }
 
 
-def _at(plant: Plant, outcome: Outcome, place: str) -> Array:
+def _at(plant: Plant, outcome: PlantOutcome, place: str) -> Array:
     return outcome.T[:, plant.anatomy.coarse.index(place)]
 
 
@@ -154,7 +156,7 @@ def size_of_heat(watts: Array) -> dict[str, float]:
 
 
 def _kelvin(
-    plant: Plant, case: ConcealedCase, with_it: Sequence[Outcome], without: Sequence[Outcome]
+    plant: Plant, case: ConcealedCase, with_it: Sequence[PlantOutcome], without: Sequence[PlantOutcome]
 ) -> dict[str, Any]:
     changes = {
         run.programme.name: {p: _at(plant, a, p) - _at(plant, b, p) for p in case.instruments.channels}
@@ -163,7 +165,7 @@ def _kelvin(
     return sizes_of(changes)
 
 
-def _heat_of(effect: Concealed, k: int, with_it: Outcome, without: Outcome) -> Mapping[str, Array]:
+def _heat_of(effect: Concealed, k: int, with_it: PlantOutcome, without: PlantOutcome) -> Mapping[str, Array]:
     """Heat that an effect made; where it acts on inputs of the losses, by what they lose more than without it."""
     if effect.effect.before is None:
         return with_it.heat[k]
@@ -207,7 +209,7 @@ def facts_of_fault(changes: Mapping[str, Mapping[str, Array]], channels: Sequenc
     return {"K": K, "column_shift": shifts, "heat_W": {}}
 
 
-def _measured(plant: Plant, case: ConcealedCase, outcomes: Sequence[Outcome], effect: Concealed) -> dict[str, Any]:
+def _measured(plant: Plant, case: ConcealedCase, outcomes: Sequence[PlantOutcome], effect: Concealed) -> dict[str, Any]:
     changes = {}
     for run, outcome in zip(case.runs, outcomes, strict=True):
         faulty, sound = (record(plant, run, outcome, case.instruments, faults, None) for faults in ((effect,), ()))

@@ -15,7 +15,7 @@ from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.unknown import InputGain, InputOffset, NetworkParameter
 from diagnosis.forward.recurrence import lagged
 from diagnosis.forward.whitening import RandomHeat
-from diagnosis.proof.cases.time_course import Course
+from diagnosis.proof.cases.time_course import TimeCourse
 from diagnosis.proof.injection.control import Control, find_control
 from diagnosis.proof.injection.real_recording import RealRecording
 from diagnosis.setup.inference_setup import InferenceSetup
@@ -67,7 +67,7 @@ class Differences:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class CalibratedModel:
+class CalibratedMachine:
     """The model with the parameters that a recording asks for.
 
     Attributes
@@ -137,7 +137,7 @@ class CalibratedModel:
         return np.zeros(len(self.cycle.time))
 
     def differences(
-        self, changed: ThermalNetwork, sizes: Array, course: Course, extra: Mapping[str, Array] | None = None
+        self, changed: ThermalNetwork, sizes: Array, course: TimeCourse, extra: Mapping[str, Array] | None = None
     ) -> Differences:
         """Run the model with a change of several sizes and without.
 
@@ -179,7 +179,7 @@ class CalibratedModel:
         return np.stack([np.interp(self.real.time, time, column) for column in values.T])
 
 
-def calibrate(gearbox: Gearbox, real: RealRecording) -> CalibratedModel:
+def calibrate(gearbox: Gearbox, real: RealRecording) -> CalibratedMachine:
     """Calibrate the nominal model to a recording.
 
     Sensors that fit far worse than the others are left out: the inference gives every sensor the same trust, and a
@@ -207,7 +207,7 @@ def calibrate(gearbox: Gearbox, real: RealRecording) -> CalibratedModel:
         ) from error
     first = found.parts[0].point
     network = first.machine.model.network
-    return CalibratedModel(
+    return CalibratedMachine(
         real=real, nominal=setup.nominal, network=network, losses=setup.model.losses,
         parameters={p.name: float(value) for p, value in zip(network.parameters, first.setting.values, strict=True)},
         start={part.name: float(T) for part, T in zip(network.parts, first.trajectory.T[0], strict=True)},

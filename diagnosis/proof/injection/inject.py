@@ -11,7 +11,7 @@ import numpy as np
 
 from diagnosis.proof.cases.case_files import CaseFiles, case_names
 from diagnosis.proof.cases.truth import size_of, size_of_heat
-from diagnosis.proof.injection.calibrated_model import CalibratedModel, calibrate
+from diagnosis.proof.injection.calibrated_model import CalibratedMachine, calibrate
 from diagnosis.proof.injection.instrument_faults import LONGEST_STUCK_S
 from diagnosis.proof.injection.kinds import KINDS
 from diagnosis.proof.injection.real_recording import RealRecording, read_real_recording
@@ -74,7 +74,7 @@ class Injector:
         return frozenset({f"{self.real.stem}.csv.gz", *([] if mapping is None else [mapping.name])})
 
     @cached_property
-    def model(self) -> CalibratedModel:
+    def model(self) -> CalibratedMachine:
         """The calibrated model.
 
         Raises

@@ -10,8 +10,8 @@ import sympy as sp
 from scipy.ndimage import median_filter
 
 from diagnosis.forward.recurrence import lagged
-from diagnosis.proof.cases.time_course import Course
-from diagnosis.proof.injection.calibrated_model import CalibratedModel
+from diagnosis.proof.cases.time_course import TimeCourse
+from diagnosis.proof.injection.calibrated_model import CalibratedMachine
 from diagnosis.proof.injection.machine_changes import input_shift
 from diagnosis.proof.injection.real_recording import RealRecording
 from diagnosis.proof.injection.trial import SIZES, SMALLEST, Trial, ladder
@@ -29,20 +29,20 @@ USUAL_PERCENTILE = 95.0
 SMOOTH = 7  # rows of a running median
 
 
-def bias(real: RealRecording, channel: str, course: Course, rng: np.random.Generator) -> Trial:
+def bias(real: RealRecording, channel: str, course: TimeCourse, rng: np.random.Generator) -> Trial:
     """Reading plus `size` [K]."""
     sizes = ladder(-BIAS_K, BIAS_K, rng)
     shift = sizes[:, None] * np.where(np.isnan(real.channels[channel]), np.nan, course.share(real.time))
     return _sensor(real, channel, course, sizes, "K", shift)
 
 
-def gain(real: RealRecording, channel: str, course: Course, rng: np.random.Generator) -> Trial:
+def gain(real: RealRecording, channel: str, course: TimeCourse, rng: np.random.Generator) -> Trial:
     """Reading in degC times ``1 + size``."""
     sizes = ladder(-GAIN, GAIN, rng)
     return _sensor(real, channel, course, sizes, "1", sizes[:, None] * real.channels[channel] * course.share(real.time))
 
 
-def lag(real: RealRecording, channel: str, course: Course, _: np.random.Generator) -> Trial:
+def lag(real: RealRecording, channel: str, course: TimeCourse, _: np.random.Generator) -> Trial:
     """A slower sensor: the reading follows the old one with a time constant of `size` [s]."""
     sizes = max(LONGEST_LAG_S, LONGEST_LAG_ROWS * real.step_s) * np.geomspace(SMALLEST, 1.0, SIZES)
     sizes = sizes[sizes >= 0.1 * real.step_s]
@@ -55,7 +55,7 @@ def lag(real: RealRecording, channel: str, course: Course, _: np.random.Generato
     return _sensor(real, channel, course, sizes, "s", np.where(np.isfinite(values), shift, np.nan))
 
 
-def stuck(real: RealRecording, channel: str, course: Course, _: np.random.Generator) -> Trial:
+def stuck(real: RealRecording, channel: str, course: TimeCourse, _: np.random.Generator) -> Trial:
     """The reading stays as it was."""
     values, acts = real.channels[channel], course.share(real.time)
     before = np.flatnonzero(np.isfinite(values) & (real.time < course.begins))
@@ -65,7 +65,7 @@ def stuck(real: RealRecording, channel: str, course: Course, _: np.random.Genera
     return _sensor(real, channel, course, np.ones(1), "1", ((held - values) * acts)[None])
 
 
-def swapped(real: RealRecording, channel: str, course: Course, rng: np.random.Generator) -> Trial:
+def swapped(real: RealRecording, channel: str, course: TimeCourse, rng: np.random.Generator) -> Trial:
     """Two sensors in each other's columns."""
     others = [name for name in real.channels if name != channel]
     other = others[int(rng.integers(len(others)))]
@@ -80,7 +80,7 @@ def swapped(real: RealRecording, channel: str, course: Course, rng: np.random.Ge
     )  # fmt: skip
 
 
-def clock(real: RealRecording, _: str, course: Course, __: np.random.Generator) -> Trial:
+def clock(real: RealRecording, _: str, course: TimeCourse, __: np.random.Generator) -> Trial:
     """All temperatures come whole rows late against the inputs; `size` [s].
 
     It is chosen by the rms change of the median sensor: noise and spikes move as well, and would look like an effect.
@@ -106,7 +106,7 @@ def clock(real: RealRecording, _: str, course: Course, __: np.random.Generator) 
     )  # fmt: skip
 
 
-def input_offset(model: CalibratedModel, name: str, course: Course, rng: np.random.Generator) -> Trial:
+def input_offset(model: CalibratedMachine, name: str, course: TimeCourse, rng: np.random.Generator) -> Trial:
     """Recorded input plus `size`, in the unit inside."""
     real, network = model.real, model.network
     is_temperature = name in network.inputs and network.inputs[name].quantity.is_temperature
@@ -117,7 +117,7 @@ def input_offset(model: CalibratedModel, name: str, course: Course, rng: np.rand
     return _input(model, name, sp.Integer(1), course, sizes, unit, shift)
 
 
-def input_gain(model: CalibratedModel, name: str, course: Course, rng: np.random.Generator) -> Trial:
+def input_gain(model: CalibratedMachine, name: str, course: TimeCourse, rng: np.random.Generator) -> Trial:
     """Recorded input times ``1 + size``."""
     sizes = ladder(-INPUT_GAIN, INPUT_GAIN, rng)
     shift = sizes[:, None] * model.real.inputs[name] * course.share(model.real.time)
@@ -125,7 +125,7 @@ def input_gain(model: CalibratedModel, name: str, course: Course, rng: np.random
 
 
 def _sensor(
-    real: RealRecording, channel: str, course: Course, sizes: Array, unit: str, shift: Array
+    real: RealRecording, channel: str, course: TimeCourse, sizes: Array, unit: str, shift: Array
 ) -> Trial:  # fmt: skip
     node = node_of_channel(channel, real.nodes)
     return Trial(
@@ -135,7 +135,7 @@ def _sensor(
 
 
 def _input(
-    model: CalibratedModel, name: str, law: sp.Expr, course: Course, sizes: Array, unit: str, shift: Array
+    model: CalibratedMachine, name: str, law: sp.Expr, course: TimeCourse, sizes: Array, unit: str, shift: Array
 ) -> Trial:  # fmt: skip
     K: Mapping[str, Array] = {channel: np.zeros(shift.shape) for channel in model.real.channels}
     if name in model.network.inputs:

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import sympy as sp
 
-from diagnosis.proof.cases.time_course import Course
-from diagnosis.proof.injection.calibrated_model import AMPLITUDE, SEEN, SIZE_AND_COURSE, CalibratedModel, Differences
+from diagnosis.proof.cases.time_course import TimeCourse
+from diagnosis.proof.injection.calibrated_model import AMPLITUDE, SEEN, SIZE_AND_COURSE, CalibratedMachine, Differences
 from diagnosis.proof.injection.trial import Trial, ladder
 from models.base.types import Array
 from models.formulas.extremes import Max, Min
@@ -36,7 +36,7 @@ CONTROLLED = (
 BY_VALVE = "; the injected valve follows the reading plus the change"
 
 
-def loss_factor(model: CalibratedModel, name: str, course: Course, rng: np.random.Generator) -> Trial:
+def loss_factor(model: CalibratedMachine, name: str, course: TimeCourse, rng: np.random.Generator) -> Trial:
     """Loss or heat source times ``1 + size``."""
     source = next(s for s in model.nominal.sources if s.name == name)
     changed = model.prepared().with_loss_factor(name, SIZE_AND_COURSE)
@@ -49,7 +49,7 @@ def loss_factor(model: CalibratedModel, name: str, course: Course, rng: np.rando
     )  # fmt: skip
 
 
-def link_factor(model: CalibratedModel, name: str, course: Course, rng: np.random.Generator) -> Trial:
+def link_factor(model: CalibratedMachine, name: str, course: TimeCourse, rng: np.random.Generator) -> Trial:
     """Conductance times ``1 + size``."""
     link = next(k for k in model.nominal.links if k.name == name)
     changed = model.prepared().with_link_factor(name, SIZE_AND_COURSE)
@@ -60,7 +60,7 @@ def link_factor(model: CalibratedModel, name: str, course: Course, rng: np.rando
     )  # fmt: skip
 
 
-def new_link(model: CalibratedModel, name: str, course: Course, rng: np.random.Generator) -> Trial:
+def new_link(model: CalibratedMachine, name: str, course: TimeCourse, rng: np.random.Generator) -> Trial:
     """A further path of `size` [W/K] between two nodes."""
     a, b = name.split("-")
     changed = model.prepared().with_link(a, b, SIZE_AND_COURSE, name="injected")
@@ -73,7 +73,7 @@ def new_link(model: CalibratedModel, name: str, course: Course, rng: np.random.G
     )  # fmt: skip
 
 
-def thermostat(model: CalibratedModel, name: str, course: Course, rng: np.random.Generator) -> Trial:
+def thermostat(model: CalibratedMachine, name: str, course: TimeCourse, rng: np.random.Generator) -> Trial:
     """A cooler with a thermostat valve: a path of up to `size` [W/K] from a node to the surroundings.
 
     The valve opens over a few kelvin, by the temperature that the injected recording shows: measured plus changed.
@@ -94,7 +94,7 @@ def thermostat(model: CalibratedModel, name: str, course: Course, rng: np.random
     )  # fmt: skip
 
 
-def heat(model: CalibratedModel, name: str, course: Course, rng: np.random.Generator) -> Trial:
+def heat(model: CalibratedMachine, name: str, course: TimeCourse, rng: np.random.Generator) -> Trial:
     """Heat of `size` [W] into a node: steady, or going with the speed."""
     speed = model.cycle.inputs["speed"]
     full = float(np.percentile(np.abs(speed), RUNNING_QUANTILE))
@@ -110,7 +110,7 @@ def heat(model: CalibratedModel, name: str, course: Course, rng: np.random.Gener
     )  # fmt: skip
 
 
-def capacity(model: CalibratedModel, name: str, course: Course, rng: np.random.Generator) -> Trial:
+def capacity(model: CalibratedMachine, name: str, course: TimeCourse, rng: np.random.Generator) -> Trial:
     """Heat capacity times ``1 + size``, from a date on."""
     network = model.prepared()
     factor = 1 + symbol(AMPLITUDE)
@@ -123,7 +123,7 @@ def capacity(model: CalibratedModel, name: str, course: Course, rng: np.random.G
 
 
 def input_shift(
-    model: CalibratedModel, name: str, law: sp.Expr, sizes: Array, course: Course
+    model: CalibratedMachine, name: str, law: sp.Expr, sizes: Array, course: TimeCourse
 ) -> Mapping[str, Array]:  # fmt: skip
     """Return the change of the model's temperatures if an input were `law` times size more, (B, rows), [K]."""
     changed = model.prepared().with_signal_shift(name, SIZE_AND_COURSE * law)
@@ -138,7 +138,7 @@ def _temperatures(d: Differences) -> dict[str, Array]:
 
 
 def _trial(
-    model: CalibratedModel, d: Differences, course: Course, *, what: str, of: str, nodes: tuple[str, ...],
+    model: CalibratedMachine, d: Differences, course: TimeCourse, *, what: str, of: str, nodes: tuple[str, ...],
     unit: str, heat: Mapping[str, Array], facts: Mapping[str, object] | None = None, further_reason: str = "",
 ) -> Trial:  # fmt: skip
     known: dict[str, object] = {
@@ -164,13 +164,13 @@ def _trial(
     )  # fmt: skip
 
 
-def _share(model: CalibratedModel, d: Differences, course: Course) -> Array:
+def _share(model: CalibratedMachine, d: Differences, course: TimeCourse) -> Array:
     """Share of a changed value that the change is, shape (B, blocks)."""
     change = d.sizes[1:, None] * course.share(model.cycle.time)[d.first :]
     return np.asarray(change / (1.0 + change))
 
 
-def _flow(model: CalibratedModel, d: Differences, name: str, share: Array | float) -> dict[str, Array]:
+def _flow(model: CalibratedMachine, d: Differences, name: str, share: Array | float) -> dict[str, Array]:
     """Return the heat that a path takes from its first end and brings to its second, (B, blocks), [W]."""
     link = next(k for k in d.network.links if k.name == name)
     law = link.conductance.xreplace({symbol(key): value for key, value in d.network.derived.items()})

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.proof.cases.time_course import FORMS, Course, Form
+from diagnosis.proof.cases.time_course import FORMS, Form, TimeCourse
 from models.base.types import Array
 
 EARLIEST, LATEST, SHORTEST = 0.25, 0.7, 0.1  # of the recording's length: when a change begins, how long it takes
@@ -19,7 +19,7 @@ SMALLEST = 1.0 / 300.0  # of the largest size
 def draw_course(
     duration_s: float, rng: np.random.Generator, *, forms: Sequence[Form] = FORMS, date_s: float | None = None,
     longest_s: float = np.inf,
-) -> Course:  # fmt: skip
+) -> TimeCourse:  # fmt: skip
     """Draw a course over the seconds of a recording.
 
     Parameters
@@ -39,7 +39,7 @@ def draw_course(
     room = duration_s - begin
     shortest = min(SHORTEST * duration_s, 0.5 * room, 0.5 * longest_s)
     end = begin + shortest + length * (min(0.9 * room, longest_s) - shortest)
-    return Course(kind=form, begins=begin, ends=duration_s if form == "step" else end)
+    return TimeCourse(kind=form, begins=begin, ends=duration_s if form == "step" else end)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,7 +72,7 @@ class Trial:
     what: str
     of: str
     nodes: tuple[str, ...]
-    course: Course
+    course: TimeCourse
     sizes: Array
     unit: str
     columns: Mapping[str, Array]

@@ -29,7 +29,7 @@ RIM_TO_BODY = 0.15  # of the tooth's height plus the ring: path between their ce
 
 
 @dataclass(frozen=True, kw_only=True)
-class Path:
+class PlantPath:
     """A heat path of the plant.
 
     Attributes
@@ -54,7 +54,7 @@ class Path:
     law: str = "fixed"
 
 
-class Anatomy:
+class PlantAnatomy:
     """Nodes, capacities and paths of one gearbox."""
 
     def __init__(self, gearbox: Gearbox) -> None:
@@ -121,76 +121,77 @@ class Anatomy:
 
     # ------------------------------------------------------------------ paths
 
-    def _paths(self) -> Iterator[Path]:
+    def _paths(self) -> Iterator[PlantPath]:
         yield from self._housing_paths()
         yield from self._gear_paths()
         yield from self._shaft_and_bearing_paths()
 
-    def _housing_paths(self) -> Iterator[Path]:
+    def _housing_paths(self) -> Iterator[PlantPath]:
         housing = self.gearbox.housing
-        area = 0.5 * (housing.inside_area_m2 + housing.outside_area_m2)
         wetted = 0.0
         for index, part in enumerate(housing.part):
             name, share = part.name, part.area_fraction
-            wall = housing.conductivity_W_mK * area * share / housing.wall_thickness_m
+            wall = housing.conductivity_W_mK * self.sizes.wall_area * share / housing.wall_thickness_m
             film = housing.oil_heat_transfer_W_m2K * housing.inside_area_m2 * share
             wetted += film
             # The lowest part is wetted by the sump, the others by what the gears throw.
-            yield Path(name=f"oil-{name}", ends=(SPLASH if index else SUMP, f"{name}.inner"),
+            yield PlantPath(name=f"oil-{name}", ends=(SPLASH if index else SUMP, f"{name}.inner"),
                        conductance=film, factor="h_oil_housing", law="oil")  # fmt: skip
             through = wall / (1.0 - 2.0 * QUARTER)
-            yield Path(name=f"wall-{name}", ends=(f"{name}.inner", f"{name}.outer"), conductance=through, factor=None)
+            yield PlantPath(
+                name=f"wall-{name}", ends=(f"{name}.inner", f"{name}.outer"), conductance=through, factor=None
+            )
             for face in ("inner", "outer"):
-                yield Path(name=f"boss-{name}", ends=(f"{name}.boss", f"{name}.{face}"),
+                yield PlantPath(name=f"boss-{name}", ends=(f"{name}.boss", f"{name}.{face}"),
                            conductance=BOSS_CONDUCTANCE * through, factor=None)  # fmt: skip
-            yield Path(name=f"{name}-{AIR}", ends=(f"{name}.outer", AIR),
+            yield PlantPath(name=f"{name}-{AIR}", ends=(f"{name}.outer", AIR),
                        conductance=housing.outside_area_m2 * share, factor=None, law="air")  # fmt: skip
         for above, below in zip(self.parts[1:], self.parts[:-1], strict=True):
             for face in ("inner", "outer"):
-                yield Path(name=f"{below}-{above}", ends=(f"{below}.{face}", f"{above}.{face}"),
+                yield PlantPath(name=f"{below}-{above}", ends=(f"{below}.{face}", f"{above}.{face}"),
                            conductance=0.5 * housing.joint_conductance_W_K, factor="housing_joint")  # fmt: skip
         standing = [part.name for part in housing.part if part.foundation]
         for name in standing:
-            yield Path(name=f"{name}-{FRAME}", ends=(f"{name}.outer", FRAME),
+            yield PlantPath(name=f"{name}-{FRAME}", ends=(f"{name}.outer", FRAME),
                        conductance=housing.foundation_conductance_W_K / len(standing), factor=None)  # fmt: skip
-        yield Path(name="sump-splash", ends=(SUMP, SPLASH), conductance=SPLASH_EXCHANGE * wetted, factor=None,
+        yield PlantPath(name="sump-splash", ends=(SUMP, SPLASH), conductance=SPLASH_EXCHANGE * wetted, factor=None,
                    law="exchange")  # fmt: skip
 
-    def _gear_paths(self) -> Iterator[Path]:
+    def _gear_paths(self) -> Iterator[PlantPath]:
         b, k = self.pair.b, self.stage.material.conductivity_W_mK
         for i, gear in enumerate(self.gears):
-            yield Path(name=f"{gear}-oil", ends=(f"{gear}.rim", SPLASH), conductance=1.0, factor="h_oil_gear",
+            yield PlantPath(name=f"{gear}-oil", ends=(f"{gear}.rim", SPLASH), conductance=1.0, factor="h_oil_gear",
                        law=f"teeth_{i}")  # fmt: skip
-            yield Path(name=f"{gear}-oil", ends=(f"{gear}.body", SUMP), conductance=1.0, factor="h_oil_gear",
+            yield PlantPath(name=f"{gear}-oil", ends=(f"{gear}.body", SUMP), conductance=1.0, factor="h_oil_gear",
                        law=f"faces_{i}")  # fmt: skip
             shaft = self.sizes.shafts[i]
             ring = 2.0 * np.pi * k * b / np.log(self.pair.r[i] / (0.5 * self.sizes.shaft(shaft).diameter))
-            yield Path(name=f"rim-{gear}", ends=(f"{gear}.rim", f"{gear}.body"), conductance=ring / RIM_TO_BODY,
+            yield PlantPath(name=f"rim-{gear}", ends=(f"{gear}.rim", f"{gear}.body"), conductance=ring / RIM_TO_BODY,
                        factor=None)  # fmt: skip
             # What the rim adds to the way from the flank to the shaft is taken off the ring.
-            yield Path(name=f"{gear}-{shaft}", ends=(f"{gear}.body", f"{shaft}.middle"),
+            yield PlantPath(name=f"{gear}-{shaft}", ends=(f"{gear}.body", f"{shaft}.middle"),
                        conductance=ring / (1.0 - 0.5 * RIM_TO_BODY), factor="gear_shaft")  # fmt: skip
         rims = f"{self.gears[0]}.rim", f"{self.gears[1]}.rim"
-        yield Path(name=MESH, ends=rims, conductance=1.0, factor="striction", law="mesh")
+        yield PlantPath(name=MESH, ends=rims, conductance=1.0, factor="striction", law="mesh")
 
-    def _shaft_and_bearing_paths(self) -> Iterator[Path]:
+    def _shaft_and_bearing_paths(self) -> Iterator[PlantPath]:
         for shaft in self.gearbox.shaft:
             section = shaft.conductivity_W_mK * np.pi / 4.0 * shaft.diameter**2
             along, seat = 0.15 * shaft.length / section, 0.10 * shaft.length / section
             for seated in self.sizes.bearings(shaft.name):
                 end, name = f"{shaft.name}.{seated}", f"{shaft.name}-{seated}"
                 ring = 0.5 * self.sizes.R_bearing(seated)
-                yield Path(name=name, ends=(f"{shaft.name}.middle", end), conductance=1.0 / along,
+                yield PlantPath(name=name, ends=(f"{shaft.name}.middle", end), conductance=1.0 / along,
                            factor="shaft_bearing")  # fmt: skip
-                yield Path(name=name, ends=(end, seated), conductance=1.0 / (seat + ring), factor="shaft_bearing")
+                yield PlantPath(name=name, ends=(end, seated), conductance=1.0 / (seat + ring), factor="shaft_bearing")
         for bearing in self.gearbox.bearing:
             outer = 2.0 / self.sizes.R_bearing(bearing.name)
             for part in self.parts:
-                yield Path(name=f"{bearing.name}-{part}", ends=(bearing.name, f"{part}.boss"),
+                yield PlantPath(name=f"{bearing.name}-{part}", ends=(bearing.name, f"{part}.boss"),
                            conductance=outer / len(self.parts), factor="bearing_housing")  # fmt: skip
             through = OIL_FLOW_HEAT * oil_flow_max(bearing.outside_diameter_mm, bearing.width_mm)
             for oil in (SUMP, SPLASH):
-                yield Path(name=f"{bearing.name}-oil", ends=(bearing.name, oil), conductance=0.5 * through,
+                yield PlantPath(name=f"{bearing.name}-oil", ends=(bearing.name, oil), conductance=0.5 * through,
                            factor="bearing_oil")  # fmt: skip
 
     # ------------------------------------------------------------------ reference values of the laws

@@ -9,12 +9,13 @@ from typing import Literal
 import numpy as np
 
 from diagnosis.proof.plant.anatomy import MESH, OIL, SPLASH, SUMP
-from diagnosis.proof.plant.plant import Moment, Plant
+from diagnosis.proof.plant.plant import Plant, PlantMoment
 from models.base.types import Array
 
 MEASUREMENT = "measurement"
 Kind = Literal["source", "link", "loss_factor", "link_factor", "signal", "sensor", "parameter"]
 Hook = Callable[["Grip"], None]
+Spoil = Callable[["Concealed", "Recorded"], None]
 Places = Callable[[Plant, np.random.Generator], tuple[str, ...]]
 Draw = Callable[[Plant, np.random.Generator, float], Mapping[str, float]]
 
@@ -33,6 +34,10 @@ class Effect:
         The law in words and symbols, for the truth
     before, after : callable or None
         Act on the inputs before, and on heat and conductances after the losses are known
+    spoil : callable or None
+        Acts on what is recorded: of a fault of measurement
+    after_noise : bool
+        True if it acts on readings with noise and steps
     catalogue : bool
         Whether the diagnosis has a mechanism of this name
     """
@@ -46,7 +51,32 @@ class Effect:
     family: str
     before: Hook | None = None
     after: Hook | None = None
+    spoil: Spoil | None = None
+    after_noise: bool = False
     catalogue: bool = True
+
+
+def acts(
+    kind: Kind, places: Places, draw: Draw, law: str, *,
+    family: str, table: dict[str, Effect], on_inputs: bool = False, before: Hook | None = None, catalogue: bool = True,
+) -> Callable[[Hook], Hook]:  # fmt: skip
+    """Enter the decorated function into a table of effects, under its name.
+
+    Parameters
+    ----------
+    on_inputs : bool
+        True if the function acts before the losses are known, see :class:`Effect`
+    before : callable or None
+        A second function, which does
+    """
+
+    def enter(hook: Hook) -> Hook:
+        name, hooks = hook.__name__, (hook, None) if on_inputs else (before, hook)
+        table[name] = Effect(name, kind, places, draw, law, family=family, before=hooks[0], after=hooks[1],
+                             catalogue=catalogue)  # fmt: skip
+        return hook
+
+    return enter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,6 +97,26 @@ class Concealed:
     def key(self) -> str:
         """Specimens of one key act together."""
         return "@".join((self.effect.name, *self.places))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recorded:
+    """A recording on its way, which faults of measurement change.
+
+    Attributes
+    ----------
+    time : Array, shape (rows,)
+        [s]
+    housing : Array, shape (rows,)
+        True temperature of the last part of the housing, [degC]
+    inputs, readings : dict of str to Array, shape (rows,)
+        Recorded inputs by name, and temperatures by place, [degC]
+    """
+
+    time: Array
+    housing: Array
+    inputs: dict[str, Array]
+    readings: dict[str, Array]
 
 
 class Grip:
@@ -98,7 +148,7 @@ class Grip:
         self.places = specimens[0].places
         names = specimens[0].parameters
         self.p = {name: np.array([specimen.parameters[name] for specimen in specimens]) for name in names}
-        self.moment: Moment
+        self.moment: PlantMoment
         self.row, self.rows = 0, rows
         self.made: dict[str, Array] = {}
         self.memory: dict[str, Array] = {}

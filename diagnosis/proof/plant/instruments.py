@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,9 +10,9 @@ from scipy.signal import lfilter, lfiltic
 
 from diagnosis.proof.plant.cycles import ROW_S, reference_torque
 from diagnosis.proof.plant.draws import at, either, one_of, relative
-from diagnosis.proof.plant.effect import MEASUREMENT, Concealed, Draw, Effect, Kind, Places
+from diagnosis.proof.plant.effect import MEASUREMENT, Concealed, Draw, Effect, Kind, Places, Recorded, Spoil
 from diagnosis.proof.plant.plant import Plant
-from diagnosis.proof.plant.plant_run import INPUTS, Outcome, Run
+from diagnosis.proof.plant.plant_run import INPUTS, PlantOutcome, PlantRun
 from models.base.types import Array
 from models.quantities.quantities import column_of_input
 
@@ -78,8 +78,8 @@ class Instruments:
 
 def record(
     plant: Plant,
-    run: Run,
-    outcome: Outcome,
+    run: PlantRun,
+    outcome: PlantOutcome,
     instruments: Instruments,
     faults: Sequence[Concealed],
     rng: np.random.Generator | None,
@@ -88,7 +88,7 @@ def record(
 
     Parameters
     ----------
-    outcome : Outcome
+    outcome : PlantOutcome
         What the plant did in it
     faults : sequence of Concealed
         Faults of measurement, of :data:`SENSOR_EFFECTS`
@@ -100,28 +100,27 @@ def record(
     dict of column name to Array, shape (rows,)
     """
     first, rows = run.programme.unrecorded, len(outcome.T)
-    time = np.asarray(np.arange(rows) * ROW_S, dtype=np.float64)
-    true = {name: run.programme.inputs[name][first:] for name in INPUTS}
-    inputs = {column_of_input(name): values for name, values in instruments.inputs(true).items()}
     places = plant.anatomy.coarse
-    readings = {p: lagged(outcome.T[:, places.index(p)], instruments.lag_s[p]) for p in instruments.channels}
-    loss = instruments.loss(outcome.P_loss)
-    housing = outcome.T[:, places.index(plant.anatomy.parts[-1])]
-    for fault in faults:
-        _spoil_inputs(fault, inputs, housing)
-        _spoil_readings(fault, readings, time)
+    recorded = Recorded(
+        time=np.asarray(np.arange(rows) * ROW_S, dtype=np.float64),
+        housing=outcome.T[:, places.index(plant.anatomy.parts[-1])],
+        inputs=instruments.inputs({name: run.programme.inputs[name][first:] for name in INPUTS}),
+        readings={p: lagged(outcome.T[:, places.index(p)], instruments.lag_s[p]) for p in instruments.channels},
+    )
+    inputs, readings, loss = recorded.inputs, recorded.readings, instruments.loss(outcome.P_loss)
+    _spoil(recorded, faults, after_noise=False)
     if rng is not None:
-        inputs["T_ambient_degC"] = inputs["T_ambient_degC"] + 0.1 * rng.standard_normal(rows)
+        inputs["T_ambient"] = inputs["T_ambient"] + 0.1 * rng.standard_normal(rows)
         for values in readings.values():
             values += instruments.noise_K * rng.standard_normal(rows)
             values[:] = np.round(values / instruments.quantum_K) * instruments.quantum_K
         loss = loss + instruments.noise_of_loss(loss, rng)
-    for fault in faults:
-        _hold_readings(fault, readings)
+    _spoil(recorded, faults, after_noise=True)
+    columns = {column_of_input(name): values for name, values in inputs.items()}
     temperatures = {f"T_{place}_degC": values for place, values in readings.items()}
     if rng is not None:
         drop_readings(temperatures, instruments.dropouts, rng)
-    return {"time_s": time, **inputs, **temperatures, "P_loss_W": loss}
+    return {"time_s": recorded.time, **columns, **temperatures, "P_loss_W": loss}
 
 
 def lagged(values: Array, tau_s: float, row_s: float = ROW_S) -> Array:
@@ -143,46 +142,33 @@ def drop_readings(readings: Mapping[str, Array], bursts: int, rng: np.random.Gen
 # ---------------------------------------------------------------------- faults
 
 
-def _spoil_inputs(fault: Concealed, inputs: dict[str, Array], housing: Array) -> None:
-    a = fault.parameters["a"]
-    name = fault.effect.name
-    if name == "torque_offset":
-        inputs["torque_Nm"] = inputs["torque_Nm"] + a
-    elif name == "torque_gain":
-        inputs["torque_Nm"] = inputs["torque_Nm"] * (1.0 + a)
-    elif name == "speed_gain":
-        inputs["speed_rpm"] = inputs["speed_rpm"] * (1.0 + a)
-    elif name == "ambient_probe_offset":
-        inputs["T_ambient_degC"] = inputs["T_ambient_degC"] + a
-    elif name == "ambient_probe_heated":
-        air = inputs["T_ambient_degC"]
-        inputs["T_ambient_degC"] = air + a * lagged(housing - air, 300.0)
+def _spoil(recorded: Recorded, faults: Sequence[Concealed], *, after_noise: bool) -> None:
+    for fault in faults:
+        if fault.effect.spoil is not None and fault.effect.after_noise == after_noise:
+            fault.effect.spoil(fault, recorded)
 
 
-def _spoil_readings(fault: Concealed, readings: dict[str, Array], time: Array) -> None:
-    a, name, place = fault.parameters["a"], fault.effect.name, fault.places[0]
-    if name == "sensor_bias":
-        readings[place] = readings[place] + a
-    elif name == "sensor_drift":
-        readings[place] = readings[place] + a * (time / 3600.0) ** 0.9
-    elif name == "sensor_gain":
-        readings[place] = readings[place] + a * (readings[place] - 20.0)
-    elif name == "sensor_lag":
-        readings[place] = lagged(readings[place], a)
-    elif name == "clock_offset":
-        for channel, values in readings.items():
-            readings[channel] = np.interp(time - a, time, values)
-    elif name == "swapped_channels":
-        other = fault.places[1]
-        readings[place], readings[other] = readings[other], readings[place]
+def _column(change: Callable[[Array, float, Recorded], Array]) -> Spoil:
+    """A function of the column at the place of a fault and of its strength; a clock has all temperatures."""
+
+    def spoil(fault: Concealed, recorded: Recorded) -> None:
+        columns = recorded.inputs if fault.effect.kind == "signal" else recorded.readings
+        for name in tuple(columns) if fault.places == ("clock",) else fault.places:
+            columns[name] = change(columns[name], fault.parameters["a"], recorded)
+
+    return spoil
 
 
-def _hold_readings(fault: Concealed, readings: dict[str, Array]) -> None:
+def _swap(fault: Concealed, recorded: Recorded) -> None:
+    one, other = fault.places
+    recorded.readings[one], recorded.readings[other] = recorded.readings[other], recorded.readings[one]
+
+
+def _hold(fault: Concealed, recorded: Recorded) -> None:
     """A stuck sensor repeats its last reading, noise and all."""
-    if fault.effect.name == "sensor_stuck":
-        values = readings[fault.places[0]]
-        start, end = (round(fault.parameters[key] * len(values)) for key in ("from", "until"))
-        values[start:end] = values[start]
+    values = recorded.readings[fault.places[0]]
+    start, end = (round(fault.parameters[key] * len(values)) for key in ("from", "until"))
+    values[start:end] = values[start]
 
 
 def default_channels(plant: Plant) -> tuple[str, ...]:
@@ -208,23 +194,33 @@ def _stuck(_: Plant, rng: np.random.Generator, strength: float) -> Mapping[str, 
     return {"a": strength, "from": start, "until": min(1.0, start + 0.2 * strength)}
 
 
-def _fault(name: str, places: Places, draw: Draw, law: str, kind: Kind = "sensor") -> Effect:
-    return Effect(name, kind, places, draw, law, family=MEASUREMENT)
+def _fault(
+    name: str, places: Places, draw: Draw, law: str, spoil: Spoil, kind: Kind = "sensor", *, after_noise: bool = False
+) -> Effect:
+    return Effect(name, kind, places, draw, law, family=MEASUREMENT, spoil=spoil, after_noise=after_noise)
 
 
-SENSOR_EFFECTS = (
-    _fault("sensor_bias", one_of(default_channels), either(2.0), "reading + a K"),
-    _fault("sensor_drift", one_of(default_channels), either(0.15), "reading + a t^0.9 K, t in hours"),
-    _fault("sensor_gain", one_of(default_channels), either(0.05), "reading + a (reading - 20 degC)"),
-    _fault("sensor_lag", one_of(default_channels), relative(80.0), "a first-order lag of a seconds more"),
+SENSOR_EFFECTS: Mapping[str, Effect] = {effect.name: effect for effect in (
+    _fault("sensor_bias", one_of(default_channels), either(2.0), "reading + a K", _column(lambda T, a, _: T + a)),
+    _fault("sensor_drift", one_of(default_channels), either(0.15), "reading + a t^0.9 K, t in hours",
+           _column(lambda T, a, r: T + a * (r.time / 3600.0) ** 0.9)),
+    _fault("sensor_gain", one_of(default_channels), either(0.05), "reading + a (reading - 20 degC)",
+           _column(lambda T, a, _: T + a * (T - 20.0))),
+    _fault("sensor_lag", one_of(default_channels), relative(80.0), "a first-order lag of a seconds more",
+           _column(lambda T, a, _: lagged(T, a))),
     _fault("sensor_stuck", one_of(default_channels), _stuck,
-           "the reading stands still from one fraction of the recording to another"),
-    _fault("swapped_channels", two_unlike_sensors, relative(1.0), "two columns exchanged"),
-    _fault("clock_offset", at("clock"), either(90.0), "temperatures are stamped a seconds late"),
-    _fault("torque_offset", at("torque"), _torque, "recorded torque = true + a N m", "signal"),
-    _fault("torque_gain", at("torque"), either(0.06), "recorded torque = true (1 + a)", "signal"),
-    _fault("speed_gain", at("speed"), either(0.05), "recorded speed = true (1 + a)", "signal"),
-    _fault("ambient_probe_offset", at("T_ambient"), either(2.0), "recorded ambient = true + a K", "signal"),
-    _fault("ambient_probe_heated", at("T_ambient"), relative(0.07), "recorded ambient = true + a (housing - true)",
+           "the reading stands still from one fraction of the recording to another", _hold, after_noise=True),
+    _fault("swapped_channels", two_unlike_sensors, relative(1.0), "two columns exchanged", _swap),
+    _fault("clock_offset", at("clock"), either(90.0), "temperatures are stamped a seconds late",
+           _column(lambda T, a, r: np.interp(r.time - a, r.time, T))),
+    _fault("torque_offset", at("torque"), _torque, "recorded torque = true + a N m", _column(lambda M, a, _: M + a),
            "signal"),
-)  # fmt: skip
+    _fault("torque_gain", at("torque"), either(0.06), "recorded torque = true (1 + a)",
+           _column(lambda M, a, _: M * (1.0 + a)), "signal"),
+    _fault("speed_gain", at("speed"), either(0.05), "recorded speed = true (1 + a)",
+           _column(lambda n, a, _: n * (1.0 + a)), "signal"),
+    _fault("ambient_probe_offset", at("T_ambient"), either(2.0), "recorded ambient = true + a K",
+           _column(lambda T, a, _: T + a), "signal"),
+    _fault("ambient_probe_heated", at("T_ambient"), relative(0.07), "recorded ambient = true + a (housing - true)",
+           _column(lambda T, a, r: T + a * lagged(r.housing - T, 300.0)), "signal"),
+)}  # fmt: skip

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from diagnosis.proof.plant.anatomy import MESH, OIL, SUMP
-from diagnosis.proof.plant.plant import Moment, Plant
+from diagnosis.proof.plant.plant import Plant, PlantMoment
 from diagnosis.proof.plant.sizes import T_SERVICE
 from models.base.types import Array
 from models.formulas.heat_transfer import STEFAN_BOLTZMANN
@@ -17,7 +17,7 @@ from models.quantities.units import KELVIN
 FILM_REFERENCE_K = 316.65  # film temperature at which the reference of the convection is taken
 
 
-class Laws:
+class PlantLaws:
     """Losses, conductances and capacities of B gearboxes of one definition.
 
     Parameters
@@ -60,11 +60,11 @@ class Laws:
         self.forced, self.oil_exponent, self.exchange = forced_exponent, oil_exponent, exchange_exponent
         self.loss_factor[:, 0] *= plant.reading_scale[self.reading]
 
-    def losses(self, moment: Moment) -> Array:
+    def losses(self, moment: PlantMoment) -> Array:
         """Loss of every component, shape (B, c), [W]; thinner oil is read as hotter oil, except by the seals."""
         return np.asarray(self.losses_at_one(moment) * self.loss_factor)
 
-    def losses_at_one(self, moment: Moment) -> Array:
+    def losses_at_one(self, moment: PlantMoment) -> Array:
         """Losses with all factors at 1, shape (B, c), [W]."""
         index, anatomy = self.plant.anatomy.index, self.plant.anatomy
         oil = moment.T[:, index[SUMP]]
@@ -85,7 +85,7 @@ class Laws:
                 columns.append(term.power(moment.speed, moment.torque, {OIL: oil}))
         return np.asarray(np.concatenate(columns, axis=1))
 
-    def conductances(self, moment: Moment) -> Array:
+    def conductances(self, moment: PlantMoment) -> Array:
         """Conductance of every path, shape (B, p), [W/K]."""
         G = self.base.copy()
         for column, path in enumerate(self.plant.anatomy.paths):
@@ -93,7 +93,7 @@ class Laws:
                 G[:, column] = self._law(path.law, column, moment)
         return G
 
-    def _law(self, law: str, column: int, moment: Moment) -> Array:
+    def _law(self, law: str, column: int, moment: PlantMoment) -> Array:
         plant, anatomy = self.plant, self.plant.anatomy
         base, index = self.base[:, column], anatomy.index
         path = anatomy.paths[column]
@@ -112,7 +112,7 @@ class Laws:
         to_oil = self._gear_to_oil(kind, int(gear), moment.T[:, index[SUMP]], moment.speed)
         return np.asarray(base * to_oil * np.maximum(relative, 0.02) ** self.oil_exponent)
 
-    def _to_air(self, node: str, area: Array, moment: Moment) -> Array:
+    def _to_air(self, node: str, area: Array, moment: PlantMoment) -> Array:
         """Wall to air with radiation, behind the quarter of the wall; mixed convection by the cubic rule."""
         anatomy = self.plant.anatomy
         T, T_a = moment.T[:, anatomy.index[node]], moment.air
@@ -128,7 +128,7 @@ class Laws:
         wall = anatomy.half_wall / anatomy.share[node.removesuffix(".outer")]
         return np.asarray(1.0 / (1.0 / np.maximum(h * area, 1e-9) + wall))
 
-    def _striction(self, moment: Moment) -> Array:
+    def _striction(self, moment: PlantMoment) -> Array:
         """Conductance from the contact into one gear, [W/K]: flash temperature at the pitch point, exponents rounded.
 
         ``b_H ~ T^(1/2)`` and ``G ~ (b_H u)^(1/2)``: Blok's law, with 0.48 and 0.26 in place of 1/2 and 1/4.

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.proof.plant.anatomy import MESH, OIL, SPLASH, SUMP, Anatomy
+from diagnosis.proof.plant.anatomy import MESH, OIL, SPLASH, SUMP, PlantAnatomy
 from diagnosis.proof.plant.cycles import reference_torque, top_speed
 from diagnosis.proof.plant.sizes import refuse_unbuilt
 from models.assembly.gearbox import Gearbox
@@ -31,7 +31,7 @@ READINGS: tuple[Mapping[str, object], ...] = (
 
 
 @dataclass(kw_only=True)
-class Moment:
+class PlantMoment:
     """The middle of a step, of all runs at once; effects change it through their grip.
 
     Shapes: (B,) of runs, (B, n) of nodes, (B, c) of loss components, (B, p) of paths, (B, b) of bearings.
@@ -60,7 +60,7 @@ class Plant:
     def __init__(self, gearbox: Gearbox) -> None:
         refuse_unbuilt(gearbox)
         self.gearbox = gearbox
-        self.anatomy = Anatomy(gearbox)
+        self.anatomy = PlantAnatomy(gearbox)
         nominal = gearbox.losses()
         self.components = nominal.components
         self.oil = gearbox.lubricant()

@@ -13,8 +13,8 @@ import numpy as np
 from diagnosis.proof.plant.cycles import ROW_S, Programme
 from diagnosis.proof.plant.effect import Concealed, Effect, Grip
 from diagnosis.proof.plant.integrator import sdirk_step
-from diagnosis.proof.plant.laws import Laws
-from diagnosis.proof.plant.plant import Moment, Plant
+from diagnosis.proof.plant.laws import PlantLaws
+from diagnosis.proof.plant.plant import Plant, PlantMoment
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 
@@ -52,7 +52,7 @@ def factor_sd(gearbox: Gearbox, factor: str) -> float:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run:
+class PlantRun:
     """One gearbox in one recording.
 
     Attributes
@@ -70,7 +70,7 @@ class Run:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Outcome:
+class PlantOutcome:
     """Result of one run without the rows before the recording.
 
     Attributes
@@ -83,20 +83,17 @@ class Outcome:
         What the components of the loss model lose there, [W]
     heat : tuple of mapping of place to Array, shape (rows,)
         Heat [W] that each effect made in each place
-    stored, given, shed : float
-        Heat balance of the whole run, [J]: stored in the nodes, given by all sources, left through boundaries
     """
 
     T: Array
     P_loss: Array
     losses: Mapping[str, Array]
     heat: tuple[Mapping[str, Array], ...]
-    stored: float
-    given: float
-    shed: float
 
 
-def run_plant(plant: Plant, runs: Sequence[Run], progress: Callable[[int], None] | None = None) -> list[Outcome]:
+def run_plant(
+    plant: Plant, runs: Sequence[PlantRun], progress: Callable[[int], None] | None = None
+) -> list[PlantOutcome]:
     """Integrate runs; those of equal length go through one loop.
 
     Parameters
@@ -106,10 +103,10 @@ def run_plant(plant: Plant, runs: Sequence[Run], progress: Callable[[int], None]
 
     Returns
     -------
-    list of Outcome
+    list of PlantOutcome
         In the order of `runs`
     """
-    outcomes: dict[int, Outcome] = {}
+    outcomes: dict[int, PlantOutcome] = {}
     for length in sorted({len(run) for run in runs}):
         members = [i for i, run in enumerate(runs) if len(run) == length]
         batch = _Batch(plant, [runs[i] for i in members])
@@ -120,13 +117,13 @@ def run_plant(plant: Plant, runs: Sequence[Run], progress: Callable[[int], None]
 class _Batch:
     """Runs of equal length on their way through time."""
 
-    def __init__(self, plant: Plant, runs: Sequence[Run]) -> None:
+    def __init__(self, plant: Plant, runs: Sequence[PlantRun]) -> None:
         self.plant, self.runs = plant, runs
         anatomy = plant.anatomy
         self.n = len(anatomy.nodes)
         who = [run.individual for run in runs]
         names = sorted({name for individual in who for name in individual.factors})
-        self.laws = Laws(
+        self.laws = PlantLaws(
             plant,
             {name: np.array([individual.factors.get(name, 1.0) for individual in who]) for name in names},
             reading=np.array([individual.reading for individual in who]),
@@ -154,7 +151,7 @@ class _Batch:
 
     # ------------------------------------------------------------------ time
 
-    def integrate(self, progress: Callable[[int], None] | None) -> list[Outcome]:
+    def integrate(self, progress: Callable[[int], None] | None) -> list[PlantOutcome]:
         """All rows of all runs."""
         rows, B, anatomy = len(self.runs[0]), len(self.runs), self.plant.anatomy
         driven = [run.programme.inputs for run in self.runs]
@@ -166,7 +163,6 @@ class _Batch:
         kept = np.empty((rows, B, len(anatomy.coarse)))
         lost = np.empty((rows, B))
         losses = {place: np.zeros((rows, B)) for place in map(self.plant.place_of, self.plant.components)}
-        balance = np.zeros((3, B))
         for row in range(rows):
             kept[row] = T @ anatomy.reading.T
             after = min(row + 1, rows - 1)
@@ -176,50 +172,39 @@ class _Batch:
             lost[row] = moment.lost
             for k, component in enumerate(self.plant.components):
                 losses[self.plant.place_of(component)][row] += moment.loss[:, k]
-            before, T = T, self._step(T, moment, balance)
+            before, T = T, self._step(T, moment)
             if progress is not None and row % 20 == 19:
                 progress(20 * B)
-        return [self._outcome(i, kept, lost, losses, balance[:, i]) for i in range(B)]
+        return [self._outcome(i, kept, lost, losses) for i in range(B)]
 
-    def _outcome(self, i: int, kept: Array, lost: Array, losses: Mapping[str, Array], balance: Array) -> Outcome:
+    def _outcome(self, i: int, kept: Array, lost: Array, losses: Mapping[str, Array]) -> PlantOutcome:
         first = self.runs[i].programme.unrecorded
         heat: list[Mapping[str, Array]] = [{} for _ in self.runs[i].effects]
         for _, grip in self.grips:
             for k in np.flatnonzero(grip.members == i):
                 heat[grip.positions[k]] = {place: values[first:, k] for place, values in grip.made.items()}
-        return Outcome(
+        return PlantOutcome(
             T=kept[first:, i],
             P_loss=lost[first:, i],
             losses={place: values[first:, i] for place, values in losses.items()},
             heat=tuple(heat),
-            stored=float(balance[0]),
-            given=float(balance[1]),
-            shed=float(balance[2]),
         )
 
-    def _step(self, T: Array, moment: Moment, balance: Array) -> Array:
-        """Temperatures after a step; adds what is stored, given and shed in it to `balance`, shape (3, B), [J]."""
+    def _step(self, T: Array, moment: PlantMoment) -> Array:
         plant, B, n = self.plant, len(T), self.n
         K = np.zeros((B, n, n))
         K[:, plant.a, plant.b] = K[:, plant.b, plant.a] = -moment.G
         K[:, np.arange(n), np.arange(n)] = moment.G @ plant.touching + moment.ground
-        boundary = list(plant.anatomy.boundary)
         T = T.copy()
-        T[:, boundary] = moment.air[:, None]
+        T[:, list(plant.anatomy.boundary)] = moment.air[:, None]
         heat = moment.heat + moment.ground_heat
-        new, mean = sdirk_step(T=T, capacity=moment.capacity, K=K, heat=heat, dt=ROW_S)
-        own = np.setdiff1d(np.arange(n), boundary)
-        balance[0] += (moment.capacity * (new - T))[:, own].sum(axis=1)
-        balance[1] += ROW_S * moment.heat.sum(axis=1)
-        for path in np.flatnonzero(np.isin(plant.b, boundary)):
-            balance[2] += ROW_S * moment.G[:, path] * (mean[:, plant.a[path]] - mean[:, plant.b[path]])
-        balance[2] += ROW_S * (moment.ground * mean - moment.ground_heat).sum(axis=1)
+        new, _ = sdirk_step(T=T, capacity=moment.capacity, K=K, heat=heat, dt=ROW_S)
         return np.asarray(new)
 
-    def _moment(self, row: int, hours: Array, inputs: Mapping[str, Array], T: Array) -> Moment:
+    def _moment(self, row: int, hours: Array, inputs: Mapping[str, Array], T: Array) -> PlantMoment:
         B, anatomy = len(self.runs), self.plant.anatomy
         bearings = len(anatomy.bearings)
-        moment = Moment(
+        moment = PlantMoment(
             hours=hours, speed=inputs["speed"].copy(), torque=inputs["torque"].copy(), air=inputs["T_ambient"].copy(),
             air_speed=inputs["air_speed"].copy(), T=T, thinning=np.zeros(B), bearing_load=np.ones((B, bearings)),
             loss=np.zeros((B, len(self.plant.components))), lost=np.zeros(B), heat=self.random_heat[row].copy(),

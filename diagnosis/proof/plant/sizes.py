@@ -83,14 +83,18 @@ class BoxSizes:
         """Bearings of a shaft."""
         return [bearing.name for bearing in self.gearbox.bearing if bearing.shaft == shaft]
 
+    @cached_property
+    def wall_area(self) -> float:
+        """Mean of the inner and the outer area of all walls, [m^2]."""
+        return 0.5 * (self.gearbox.housing.inside_area_m2 + self.gearbox.housing.outside_area_m2)
+
     # ------------------------------------------------------------------ capacities, [J/K]
 
     @cached_property
     def C_housing(self) -> float:
         """Heat capacity of all walls."""
         housing = self.gearbox.housing
-        area = 0.5 * (housing.inside_area_m2 + housing.outside_area_m2)
-        return area * housing.wall_thickness_m * housing.density_kg_m3 * housing.specific_heat_J_kgK
+        return self.wall_area * housing.wall_thickness_m * housing.density_kg_m3 * housing.specific_heat_J_kgK
 
     @cached_property
     def C_oil(self) -> float:
@@ -119,8 +123,7 @@ class BoxSizes:
     def R_wall(self) -> float:
         """Resistance of the whole wall, from face to face."""
         housing = self.gearbox.housing
-        area = 0.5 * (housing.inside_area_m2 + housing.outside_area_m2)
-        return housing.wall_thickness_m / (housing.conductivity_W_mK * area)
+        return housing.wall_thickness_m / (housing.conductivity_W_mK * self.wall_area)
 
     def R_gear(self, i: int) -> float:
         """Resistance of a gear between shaft and pitch circle."""

@@ -58,7 +58,7 @@ class Claim:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Answer:
+class ReadAnswer:
     """Answer to one case.
 
     Attributes
@@ -87,7 +87,7 @@ class Answer:
         return self.verdict not in ("failed", "refused")
 
 
-def read_answer(result: Mapping[str, Any] | None, gearbox: Gearbox, *, otherwise: str = "failed") -> Answer:
+def read_answer(result: Mapping[str, Any] | None, gearbox: Gearbox, *, otherwise: str = "failed") -> ReadAnswer:
     """Read the content of ``diagnosis.json``, whole or compact.
 
     Parameters
@@ -98,13 +98,13 @@ def read_answer(result: Mapping[str, Any] | None, gearbox: Gearbox, *, otherwise
         Verdict where there is no result
     """
     if result is None:
-        return Answer(verdict=otherwise)
+        return ReadAnswer(verdict=otherwise)
     errors = result.get("fit", {}).get("holdout") or {}
     after = [errors.get(f"rmse_{stage}_K") for stage in ("calibrated", "after")]
     location = max(result.get("location") or [{}], key=lambda place: place.get("probability") or 0.0)
     if result["verdict"] not in (*get_args(Verdict), "failed", "refused"):
         raise ValueError(f"there is no verdict {result['verdict']!r}")
-    return Answer(
+    return ReadAnswer(
         verdict=result["verdict"],
         claims=tuple(_claim(finding, gearbox) for finding in result.get("findings") or []),
         node=str(location.get("node") or ""),

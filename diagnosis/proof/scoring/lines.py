@@ -33,7 +33,7 @@ SHORT = "train_2"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Settings:
+class ProofSettings:
     """Options of a proof.
 
     Attributes
@@ -91,7 +91,7 @@ class Task:
 # ---------------------------------------------------------------------- what a diagnosis gets
 
 
-def tasks_of(settings: Settings, cases: Sequence[str], alone: Mapping[str, str]) -> list[Task]:
+def tasks_of(settings: ProofSettings, cases: Sequence[str], alone: Mapping[str, str]) -> list[Task]:
     """All diagnoses of a proof, those of everything first.
 
     Parameters
@@ -208,7 +208,7 @@ def code_hash() -> str:
     return digest.hexdigest()
 
 
-def begin_lines(file: Path, settings: Settings) -> None:
+def begin_lines(file: Path, settings: ProofSettings) -> None:
     """Write the first line.
 
     Raises
@@ -226,7 +226,7 @@ def begin_lines(file: Path, settings: Settings) -> None:
         raise InputError(f"{file}: cannot be written ({error.strerror})") from error
 
 
-def read_lines(file: Path) -> tuple[Settings, str, dict[Task, dict[str, Any]]]:
+def read_lines(file: Path) -> tuple[ProofSettings, str, dict[Task, dict[str, Any]]]:
     """Settings, hash of the code and answered tasks; a last line that is not whole is cut off.
 
     Raises
@@ -238,7 +238,7 @@ def read_lines(file: Path) -> tuple[Settings, str, dict[Task, dict[str, Any]]]:
         content = file.read_text(encoding="utf-8")
         whole = content[: content.rfind("\n") + 1]
         first, *lines = map(json.loads, whole.splitlines())
-        settings = Settings(**first["settings"])
+        settings = ProofSettings(**first["settings"])
         records = {Task(**line.pop("task")): {**line, "recordings": str(line["recordings"])} for line in lines}
         code = str(first["code"])
     except OSError as error:

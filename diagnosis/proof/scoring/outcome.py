@@ -11,8 +11,8 @@ import numpy as np
 from scipy.stats import binomtest
 
 from diagnosis.proof.scoring.answers import CERTAIN, read_answer
-from diagnosis.proof.scoring.lines import Settings, Task, kept_columns
-from diagnosis.proof.scoring.rules import RULES, Item, Rule, is_right
+from diagnosis.proof.scoring.lines import ProofSettings, Task, kept_columns
+from diagnosis.proof.scoring.rules import RULES, Item, ScoringRule, is_right
 from diagnosis.proof.scoring.seeds import role_of
 from diagnosis.proof.scoring.truth import Truth
 from models.assembly.gearbox import Gearbox, load_gearbox
@@ -28,7 +28,7 @@ def outcome(
     records: Mapping[Task, Mapping[str, Any]],
     gearbox: Gearbox,
     *,
-    settings: Settings | None = None,
+    settings: ProofSettings | None = None,
     code: str = "",
 ) -> dict[str, Any]:
     """Score all answers.
@@ -96,7 +96,7 @@ def outcome(
     }  # fmt: skip
 
 
-def _counted(rule: Rule, items: Sequence[Item]) -> dict[str, Any]:
+def _counted(rule: ScoringRule, items: Sequence[Item]) -> dict[str, Any]:
     """Hits of a rule; where a random answer may be right, also how often it would be."""
     asked = [item for item in items if rule.when(item)]
     counted = count([rule.right(item) for item in asked])

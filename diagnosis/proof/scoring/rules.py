@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from diagnosis.proof.scoring.answers import CERTAIN, PARAMETER, Answer, Claim
+from diagnosis.proof.scoring.answers import CERTAIN, PARAMETER, Claim, ReadAnswer
 from diagnosis.proof.scoring.truth import CONTROL, MEASUREMENT, TrueEffect, Truth
 from diagnosis.proof.zoo.setting import Changed
 
@@ -29,7 +29,7 @@ class Item:
     case: str
     truth: Truth
     effect: TrueEffect | None
-    answer: Answer
+    answer: ReadAnswer
     near: Mapping[str, frozenset[str]]
     first: bool = True
 
@@ -78,7 +78,7 @@ class Item:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rule:
+class ScoringRule:
     """A row of the table.
 
     Attributes
@@ -179,42 +179,42 @@ def heat_right(i: Item) -> bool:
 
 
 RULES = (
-    Rule(name="false alarm", bad=True, when=nothing, right=lambda i: i.answer.alarm,
+    ScoringRule(name="false alarm", bad=True, when=nothing, right=lambda i: i.answer.alarm,
          meaning="Nothing concealed, no parameter far outside its prior: the verdict is missing_physics, sensor_fault "
                  "or unexplained."),
-    Rule(name="control answered right", when=nothing, right=lambda i: i.answer.verdict in i.truth.verdicts,
+    ScoringRule(name="control answered right", when=nothing, right=lambda i: i.answer.verdict in i.truth.verdicts,
          meaning="The same cases: the verdict is consistent or parameter_error."),
-    Rule(name="far parameter named", when=lambda i: bool(i.truth.far),
+    ScoringRule(name="far parameter named", when=lambda i: bool(i.truth.far),
          right=lambda i: i.answer.verdict == "parameter_error"
          and any(is_right(key, c, i.truth) for c in i.answer.claims for key in c.odds if key[0] == PARAMETER),
          meaning="A parameter five standard deviations off: a parameter error, that parameter among those named."),
-    Rule(name="verdict right", when=lambda i: i.first, right=lambda i: i.answer.verdict in i.truth.verdicts,
+    ScoringRule(name="verdict right", when=lambda i: i.first, right=lambda i: i.answer.verdict in i.truth.verdicts,
          meaning="All cases: the verdict is one of those that the truth allows."),
-    Rule(name="named", when=in_catalogue, right=lambda i: i.named,
+    ScoringRule(name="named", when=in_catalogue, right=lambda i: i.named,
          meaning="Effects of the catalogue: a finding has the name."),
-    Rule(name="named or tied", when=in_catalogue, right=lambda i: i.tied,
+    ScoringRule(name="named or tied", when=in_catalogue, right=lambda i: i.tied,
          meaning="Effects of the catalogue: at most three names of a finding (it and its rivals of at least 5 %) hold "
                  "the true one."),
-    Rule(name="acts like", when=has_effect, right=lambda i: i.alike,
+    ScoringRule(name="acts like", when=has_effect, right=lambda i: i.alike,
          meaning="All effects: named, or the same kind of thing (loss, link, capacity, heat, sensor, input, clock) at "
                  "the same node or link is reported with the same sign."),
-    Rule(name="place right", when=in_machine, right=lambda i: i.located, chance=lambda i: i.located_by_chance,
+    ScoringRule(name="place right", when=in_machine, right=lambda i: i.located, chance=lambda i: i.located_by_chance,
          meaning="Effects in the machine: the most probable place or that of a finding is a node of the effect or "
                  "linked to it."),
-    Rule(name="named or tied, visible", when=lambda i: in_catalogue(i) and visible(i), right=lambda i: i.tied,
+    ScoringRule(name="named or tied, visible", when=lambda i: in_catalogue(i) and visible(i), right=lambda i: i.tied,
          meaning=f"Effects of the catalogue for which D_tool / 2 is {VISIBLE:.0f} nats or more: named or tied."),
-    Rule(name="acts like, visible", when=visible, right=lambda i: i.alike,
+    ScoringRule(name="acts like, visible", when=visible, right=lambda i: i.alike,
          meaning=f"All effects for which D_tool / 2 is {VISIBLE:.0f} nats or more: acts like."),
-    Rule(name="silent where nothing can be seen", when=lambda i: has_effect(i) and i.concealed.nats[1] < UNSEEN,
+    ScoringRule(name="silent where nothing can be seen", when=lambda i: has_effect(i) and i.concealed.nats[1] < UNSEEN,
          right=lambda i: i.answer.answered and not i.answer.alarm,
          meaning=f"Effects for which D_tool / 2 is below {UNSEEN:.0f} nats: no fault is reported."),
-    Rule(name="outside: no wrong name", when=outside,
+    ScoringRule(name="outside: no wrong name", when=outside,
          right=lambda i: i.answer.alarm and not any(c.name and c.probability >= CERTAIN for c in i.answer.claims),
          meaning=f"Effects in no catalogue: a fault is reported, and no name of the catalogue with "
                  f"{CERTAIN:.0%} or more."),
-    Rule(name="heat within 20 %", when=sized, right=heat_right,
+    ScoringRule(name="heat within 20 %", when=sized, right=heat_right,
          meaning="Effects that are named and make heat: the mean heat of the finding is within 20 % of the truth."),
-    Rule(name="held-out error improves", when=lambda i: i.first and has_effect(i) and bool(i.answer.claims)
+    ScoringRule(name="held-out error improves", when=lambda i: i.first and has_effect(i) and bool(i.answer.claims)
          and math.isfinite(i.answer.holdout_K[1]),
          right=lambda i: i.answer.holdout_K[1] < i.answer.holdout_K[0],
          meaning="Something is concealed and found: the held-out error is below that of calibration alone."),

@@ -12,7 +12,7 @@ from diagnosis.proof.zoo.faults import Fault, spoiled
 from diagnosis.proof.zoo.oracle import LOSS, OracleNats
 from diagnosis.proof.zoo.recorder import measure
 from diagnosis.proof.zoo.simulate import simulate
-from diagnosis.proof.zoo.structure import Change, Law, Outcome, Variant, ZooPlant
+from diagnosis.proof.zoo.structure import Law, Variant, ZooChange, ZooOutcome, ZooPlant
 from models.base.types import Array
 
 GROUPS = ("control", "single", "date", "sensor", "pair", "outside", "messy")
@@ -55,15 +55,15 @@ class CaseRuns:
     ----------
     sets : tuple of tuples of int
         Which effects act in each run of a batch: all, none, and every one alone
-    outcomes : mapping of str to Outcome
+    outcomes : mapping of str to ZooOutcome
         By recording; a baseline has one run
-    as_recorded : mapping of str to Outcome
+    as_recorded : mapping of str to ZooOutcome
         Of the training recordings, with errors of recorded inputs turned into errors of the true ones
     """
 
     sets: tuple[tuple[int, ...], ...]
-    outcomes: Mapping[str, Outcome]
-    as_recorded: Mapping[str, Outcome]
+    outcomes: Mapping[str, ZooOutcome]
+    as_recorded: Mapping[str, ZooOutcome]
 
     @property
     def none(self) -> int:
@@ -181,7 +181,7 @@ def differences(case: ZooCase, runs: CaseRuns, run: int) -> list[dict[str, Array
 
 
 def _variant(case: ZooCase, acting: Sequence[int], *, felt: bool = False) -> Variant:
-    changes: list[Change] = []
+    changes: list[ZooChange] = []
     for k in acting:
         effect = case.effects[k]
         changes += effect.changes
@@ -190,7 +190,7 @@ def _variant(case: ZooCase, acting: Sequence[int], *, felt: bool = False) -> Var
     return Variant(changes=tuple(changes))
 
 
-def _as_felt(fault: Fault, plant: ZooPlant) -> Change:
+def _as_felt(fault: Fault, plant: ZooPlant) -> ZooChange:
     """The error of a recorded input as one of the true input in the other direction; lags are left out."""
     (name,) = fault.channels
     a, course = -fault.sign * fault.strength, fault.course
@@ -208,4 +208,4 @@ def _as_felt(fault: Fault, plant: ZooPlant) -> Change:
             near = sum(weight * m.T[body] for body, weight in mix.items()) / sum(mix.values())
             return a * course.share(m.hours) * (near - m.inputs[name])
 
-    return Change(kind="input", target=name, law=law)
+    return ZooChange(kind="input", target=name, law=law)

@@ -20,7 +20,7 @@ from diagnosis.forward.grid import Piece, pieces
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.whitening import Noise
 from diagnosis.proof.plant.cycles import TRAIN, Programme
-from diagnosis.proof.zoo.families.family import Family
+from diagnosis.proof.zoo.families.family import PlantFamily
 from diagnosis.proof.zoo.programmes import MINUTES_S, programmes
 from diagnosis.proof.zoo.simulate import simulate
 from diagnosis.proof.zoo.structure import Variant, ZooPlant
@@ -57,7 +57,7 @@ class Drawn:
     rejected: int
 
 
-def draw_plant(family: Family, machine: str, seed: int, *, baselines: int = 0) -> Drawn:
+def draw_plant(family: PlantFamily, machine: str, seed: int, *, baselines: int = 0) -> Drawn:
     """Draw plants of a family until one is at an accepted distance from the nominal model.
 
     Parameters

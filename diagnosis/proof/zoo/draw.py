@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from diagnosis.proof.cases.time_course import ALWAYS, Course
+from diagnosis.proof.cases.time_course import ALWAYS, TimeCourse
 from diagnosis.proof.plant.cycles import BASELINE, HOLD, TRAIN
 from diagnosis.proof.zoo.case import CONTROLS, NatsOf, ZooCase, ZooPlan, nats_of_case, run_case
-from diagnosis.proof.zoo.distance import Drawn, draw_plant
+from diagnosis.proof.zoo.distance import draw_plant
 from diagnosis.proof.zoo.effects import Maker, ZooEffect
 from diagnosis.proof.zoo.effects_dates import DATED_MAKERS, draw_course
 from diagnosis.proof.zoo.effects_heat import HEAT_MAKERS
@@ -20,10 +20,10 @@ from diagnosis.proof.zoo.families import find_family
 from diagnosis.proof.zoo.faults import AMBIENT, INPUT_FAULTS, SENSOR_FAULTS, Fault, FaultMaker, input_of
 from diagnosis.proof.zoo.oracle_columns import design_of
 from diagnosis.proof.zoo.recorder import draw_instruments, with_slow_sensors
-from diagnosis.proof.zoo.setting import Setting, UnfitError, either, pick
+from diagnosis.proof.zoo.setting import EffectSetting, UnfitError, either, pick
 from diagnosis.proof.zoo.simulate import simulate
 from diagnosis.proof.zoo.structure import Variant
-from models.assembly.gearbox import Gearbox, load_gearbox
+from models.assembly.gearbox import load_gearbox
 from models.base.errors import InputError
 
 CATALOGUE_MAKERS: Mapping[str, Maker] = {**LOSS_MAKERS, **HEAT_MAKERS}
@@ -60,13 +60,7 @@ def draw_case(
         If the family is not known, or the definition cannot be split.
     """
     drawn = draw_plant(find_family(plan.family), plan.machine, plan.seed, baselines=baselines)
-    return draw_case_of(drawn, load_gearbox(plan.machine), plan, name=name, session_deviation=session_deviation)
-
-
-def draw_case_of(
-    drawn: Drawn, gearbox: Gearbox, plan: ZooPlan, *, name: str, session_deviation: float | None
-) -> ZooCase:
-    """Draw what is concealed in a plant, and simulate its recordings; arguments as of :func:`draw_case`."""
+    gearbox = load_gearbox(plan.machine)
     effects_rng, strength_rng, session_rng, instruments_rng = (
         np.random.default_rng([plan.seed, 7, k]) for k in range(4)
     )
@@ -93,7 +87,7 @@ def draw_case_of(
         return replace(case, runs=run_case(case, TRAIN, HOLD, BASELINE))
     # The warmest of the training recordings shows the temperatures that effects set in at.
     warm = case.recordings(TRAIN)[-1]
-    setting = Setting(plant, case.programmes, simulate(plant, warm, [Variant()]), gearbox.network().groups)
+    setting = EffectSetting(plant, case.programmes, simulate(plant, warm, [Variant()]), gearbox.network().groups)
     case = with_effects(case, draw_effects(plan.group, setting, effects_rng))
     nats_of = design_of(plant, drawn.programmes, instruments).nats_of
     case = with_effects(case, draw_strengths(case, nats_of, strength_rng))
@@ -127,7 +121,7 @@ def with_effects(case: ZooCase, effects: Sequence[ZooEffect]) -> ZooCase:
 # ---------------------------------------------------------------------- effects
 
 
-def draw_effects(group: str, setting: Setting, rng: np.random.Generator) -> tuple[ZooEffect, ...]:
+def draw_effects(group: str, setting: EffectSetting, rng: np.random.Generator) -> tuple[ZooEffect, ...]:
     """Effects of a group, still without strength."""
     kinds: tuple[str, ...]
     if group == "pair":
@@ -159,7 +153,7 @@ def _clash(one: ZooEffect, other: ZooEffect) -> bool:
     return one.name == other.name or bool(one.act.parts.names & other.act.parts.names)
 
 
-def _draw_one(kind: str, setting: Setting, rng: np.random.Generator) -> ZooEffect:
+def _draw_one(kind: str, setting: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     if kind == "sensor":
         name = str(rng.choice(list(FAULT_MAKERS)))
         return draw_fault(name, setting, rng, draw_course(setting, rng) if rng.random() < 0.4 else ALWAYS)
@@ -176,7 +170,7 @@ def _draw_one(kind: str, setting: Setting, rng: np.random.Generator) -> ZooEffec
     return replace(makers[name](setting, rng), course=course)
 
 
-def draw_fault(name: str, setting: Setting, rng: np.random.Generator, course: Course) -> ZooEffect:
+def draw_fault(name: str, setting: EffectSetting, rng: np.random.Generator, course: TimeCourse) -> ZooEffect:
     """A fault of measurement by its name in :data:`FAULT_MAKERS`.
 
     Raises
@@ -205,7 +199,7 @@ def draw_fault(name: str, setting: Setting, rng: np.random.Generator, course: Co
     if maker.fault == "lag":
         cap = max(cap, 3.0 * plant.row_s)
     if maker.fault == "stuck":
-        course = Course(kind="step", begins=setting.date(rng, 0.1, 0.7))
+        course = TimeCourse(kind="step", begins=setting.date(rng, 0.1, 0.7))
     sign = either(rng) if maker.signed else 1
     nodes = tuple(channel for channel in chosen if channel in setting.nodes)
     fault = Fault(

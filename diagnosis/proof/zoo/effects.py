@@ -11,10 +11,10 @@ from functools import cached_property, wraps
 
 import numpy as np
 
-from diagnosis.proof.cases.time_course import ALWAYS, Course
+from diagnosis.proof.cases.time_course import ALWAYS, TimeCourse
 from diagnosis.proof.zoo.faults import Fault
-from diagnosis.proof.zoo.setting import Act, Changed, Setting
-from diagnosis.proof.zoo.structure import Change, Law
+from diagnosis.proof.zoo.setting import Act, Changed, EffectSetting
+from diagnosis.proof.zoo.structure import Law, ZooChange
 
 UNITS = {"source": "W", "link": "W/K"}  # of a strength by the kind of the effect; of others 1
 
@@ -55,10 +55,10 @@ class ZooEffect:
     parameters: Mapping[str, float] = field(default_factory=dict)
     fault: Fault | None = None
     strength: float = 1.0
-    course: Course = ALWAYS
+    course: TimeCourse = ALWAYS
 
     @cached_property
-    def changes(self) -> tuple[Change, ...]:
+    def changes(self) -> tuple[ZooChange, ...]:
         """Changes of the plant at this strength and in the course of time."""
         return tuple(
             replace(change, law=_in_time(change.law, self.strength, self.course)) for change in self.act.changes
@@ -85,7 +85,7 @@ class ZooEffect:
         return replace(self, strength=strength, fault=fault)
 
 
-Maker = Callable[[Setting, np.random.Generator], ZooEffect]  # UnfitError if the plant lacks what it needs
+Maker = Callable[[EffectSetting, np.random.Generator], ZooEffect]  # UnfitError if the plant lacks what it needs
 
 
 def draft(act: Act, law: str, cap: float, unit: str = "", /, **parameters: float) -> ZooEffect:
@@ -102,7 +102,7 @@ def makes(kind: str, family: str, *, table: dict[str, Maker], in_catalogue: bool
         name = draw.__name__
 
         @wraps(draw)
-        def make(setting: Setting, rng: np.random.Generator) -> ZooEffect:
+        def make(setting: EffectSetting, rng: np.random.Generator) -> ZooEffect:
             drawn, catalogue = draw(setting, rng), name if in_catalogue else None
             unit = drawn.unit or UNITS.get(kind, "1")
             return replace(drawn, name=name, catalogue=catalogue, family=family, kind=kind, unit=unit)
@@ -113,7 +113,7 @@ def makes(kind: str, family: str, *, table: dict[str, Maker], in_catalogue: bool
     return enter
 
 
-def _in_time(law: Law, strength: float, course: Course) -> Law:
+def _in_time(law: Law, strength: float, course: TimeCourse) -> Law:
     if course.kind == "always":
         return lambda m: strength * law(m)
     return lambda m: strength * course.share(m.hours) * law(m)

@@ -6,10 +6,10 @@ from functools import partial
 
 import numpy as np
 
-from diagnosis.proof.cases.time_course import FORMS, Course
+from diagnosis.proof.cases.time_course import FORMS, TimeCourse
 from diagnosis.proof.zoo import effects
 from diagnosis.proof.zoo.effects import Maker, ZooEffect, draft
-from diagnosis.proof.zoo.setting import Setting, UnfitError, either, pick
+from diagnosis.proof.zoo.setting import EffectSetting, UnfitError, either, pick
 from diagnosis.proof.zoo.structure import constant
 
 DATED_MAKERS: dict[str, Maker] = {}
@@ -18,7 +18,7 @@ DOWN, UP = 0.9, 2.0  # greatest relative changes
 
 
 @makes("loss_factor")
-def loss_changes(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def loss_changes(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """One loss grows or falls."""
     if not s.losses_all:
         raise UnfitError("losses")
@@ -26,7 +26,7 @@ def loss_changes(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("source")
-def heat_changes(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def heat_changes(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """A heat that is no loss grows or falls."""
     names = [n for one in s.plant.sources if not one.is_loss for n in one.part_of.split("+") if n]
     if not names:
@@ -35,26 +35,26 @@ def heat_changes(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("link_factor")
-def link_changes(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def link_changes(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """One link conducts more or less."""
     return _relative(s, rng, "link", s.links)
 
 
 @makes("capacity")
-def capacity_changes(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def capacity_changes(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """One node stores more or less."""
     return _relative(s, rng, "capacity", s.nodes)
 
 
 @makes("source")
-def heat_appears(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def heat_appears(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """A constant heat into one node."""
     node = pick(s.nodes, rng)
     return draft(s.heat(node, constant(1.0)), f"a into {node}", 0.3 * s.loss)
 
 
 @makes("link")
-def link_appears(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def link_appears(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """A further way from one node to the air."""
     node = pick(s.nodes, rng)
     act = s.bridge(node, s.air(), constant(1.0), called="air")
@@ -62,7 +62,7 @@ def link_appears(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("signal")
-def set_point_changes(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def set_point_changes(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """A control that misses: the true input is larger or smaller than the recorded one."""
     names = [name for name in ("torque", "speed", "heater_power") if name in s.plant.inputs]
     if not names:
@@ -72,7 +72,7 @@ def set_point_changes(s: Setting, rng: np.random.Generator) -> ZooEffect:
     return draft(act, f"true {name} = recorded (1 {_plus(sign)} a)", 0.2)
 
 
-def _relative(s: Setting, rng: np.random.Generator, what: str, names: tuple[str, ...]) -> ZooEffect:
+def _relative(s: EffectSetting, rng: np.random.Generator, what: str, names: tuple[str, ...]) -> ZooEffect:
     name, sign = pick(names, rng), either(rng)
     law = constant(float(sign))
     if what == "link":
@@ -88,11 +88,11 @@ def _plus(sign: int) -> str:
     return "+" if sign > 0 else "-"
 
 
-def draw_course(s: Setting, rng: np.random.Generator) -> Course:
+def draw_course(s: EffectSetting, rng: np.random.Generator) -> TimeCourse:
     """A step, ramp or passing change that begins in the training recordings and lasts through later ones."""
     from_h = s.date(rng, 0.1, 0.75)
     kind = FORMS[int(rng.choice(3, p=(0.5, 0.3, 0.2)))]
     if kind == "step":
-        return Course(kind="step", begins=from_h)
+        return TimeCourse(kind="step", begins=from_h)
     lasts = float(rng.uniform(0.1, 0.6)) * s.hours
-    return Course(kind=kind, begins=from_h, ends=from_h + lasts)
+    return TimeCourse(kind=kind, begins=from_h, ends=from_h + lasts)

@@ -8,7 +8,7 @@ import numpy as np
 
 from diagnosis.proof.zoo import effects
 from diagnosis.proof.zoo.effects import Maker, ZooEffect, draft
-from diagnosis.proof.zoo.setting import Act, Setting, pick, soft
+from diagnosis.proof.zoo.setting import Act, EffectSetting, pick, soft
 from diagnosis.proof.zoo.structure import Law, Moment, constant
 from models.base.types import Array
 from models.quantities.units import KELVIN
@@ -21,7 +21,7 @@ WATER, COOLANT = "water", "coolant"
 
 
 @makes("link_factor", INSIDE)
-def aeration(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def aeration(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """Foam lowers what gears give to the oil, by a logistic function of speed."""
     x, x0 = s.speed(), float(rng.uniform(0.3, 0.6))
     act = s.link_factor(s.link_between(s.group("gears"), ("oil",)), lambda m: -soft((x(m) - x0) / 0.1), sign=-1)
@@ -29,7 +29,7 @@ def aeration(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("link_factor", INSIDE)
-def oil_housing_speed(s: Setting, _: np.random.Generator) -> ZooEffect:
+def oil_housing_speed(s: EffectSetting, _: np.random.Generator) -> ZooEffect:
     """The film on the walls grows with the logarithm of speed."""
     x = s.speed()
     act = s.link_factor(s.link_between(s.group("housing"), ("oil",)), lambda m: np.log1p(8.0 * x(m)) / np.log(9.0))
@@ -37,7 +37,7 @@ def oil_housing_speed(s: Setting, _: np.random.Generator) -> ZooEffect:
 
 
 @makes("link_factor", INSIDE)
-def oil_mist(s: Setting, _: np.random.Generator) -> ZooEffect:
+def oil_mist(s: EffectSetting, _: np.random.Generator) -> ZooEffect:
     """Mist wets the uppermost housing part, saturating with speed."""
     x = s.speed()
     names = s.link_between(s.group("housing")[-1:], ("oil",))
@@ -46,7 +46,7 @@ def oil_mist(s: Setting, _: np.random.Generator) -> ZooEffect:
 
 
 @makes("link_factor", INSIDE)
-def bearing_seat_contact(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def bearing_seat_contact(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """A loose seat, tighter while the bearing is warmer than the wall."""
     bearing = pick(s.group("bearings"), rng)
     T, wall = s.temperature(bearing), s.temperature(s.group("housing")[0])
@@ -56,7 +56,7 @@ def bearing_seat_contact(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("link_factor", OUT)
-def radiation_error(s: Setting, _: np.random.Generator) -> ZooEffect:
+def radiation_error(s: EffectSetting, _: np.random.Generator) -> ZooEffect:
     """Walls radiate less: the part of their conductance that grows with the cube of the absolute temperature."""
     wall = s.temperature(s.group("housing")[0])
     names = s.link_between(s.group("housing"), (AIR,))
@@ -65,7 +65,7 @@ def radiation_error(s: Setting, _: np.random.Generator) -> ZooEffect:
 
 
 @makes("link_factor", OUT)
-def air_cooling_change(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def air_cooling_change(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """A fan cools one wall less than it did."""
     wall = pick(s.group("housing"), rng)
     names = s.link_between((wall,), (AIR,))
@@ -74,7 +74,7 @@ def air_cooling_change(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("link_factor", AROUND)
-def fan_thermostat(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def fan_thermostat(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """A fan cools one wall, faster the warmer its feeler is."""
     wall = pick(s.group("housing"), rng)
     T_on, tau = s.quantile(wall, float(rng.uniform(0.4, 0.8))), s.lag(rng, 300.0)
@@ -84,7 +84,7 @@ def fan_thermostat(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("link", OUT)
-def foundation_conduction(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def foundation_conduction(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """The lowest part stands on a plinth that stores heat."""
     part = s.group("housing")[0]
     mass = float(rng.uniform(3.0, 15.0)) * _capacity(s, part)
@@ -93,7 +93,7 @@ def foundation_conduction(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("link", OUT)
-def hot_neighbour(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def hot_neighbour(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """A warm machine at one shaft or housing part, which itself follows the air."""
     node = s.group("shafts" if s.groups.get("shafts") else "housing")[-1]
     rise = float(rng.uniform(0.5, 1.3)) * s.rise
@@ -103,7 +103,7 @@ def hot_neighbour(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("link", OUT)
-def motor_flange(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def motor_flange(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """A motor at the input whose warmth follows the root of its power."""
     node = s.group("shafts" if s.groups.get("shafts") else "housing")[0]
     x, y, rise = s.speed(), s.load(), float(rng.uniform(0.6, 1.2)) * s.rise
@@ -113,7 +113,7 @@ def motor_flange(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("link", OUT)
-def shaft_ends_to_air(s: Setting, _: np.random.Generator) -> ZooEffect:
+def shaft_ends_to_air(s: EffectSetting, _: np.random.Generator) -> ZooEffect:
     """Shaft ends in the air, with the root of speed."""
     x, air = s.speed(), s.air()
     law: Law = lambda m: 0.1 + np.sqrt(x(m))  # noqa: E731
@@ -125,7 +125,7 @@ def shaft_ends_to_air(s: Setting, _: np.random.Generator) -> ZooEffect:
 
 
 @makes("link", CIRCUIT)
-def water_jacket(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def water_jacket(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """Water whose flow falls off as it warms the valve."""
     part, cold = s.group("housing")[0], _below_air(s, rng)
     T, T0 = s.temperature(part), s.quantile(part, 0.5)
@@ -137,30 +137,30 @@ def water_jacket(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("link", CIRCUIT)
-def cooler_thermostat(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def cooler_thermostat(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """A water cooler that a slow thermostat opens within a kelvin."""
     return _cooler(s, rng, width=0.4, power=1.0, water=True)
 
 
 @makes("link", CIRCUIT)
-def cooler_proportional(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def cooler_proportional(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """A water cooler with a proportional valve behind a lag."""
     return _cooler(s, rng, width=5.0, power=0.7, water=True)
 
 
 @makes("link", CIRCUIT)
-def cooler_air_thermostat(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def cooler_air_thermostat(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """An air cooler that a slow thermostat opens within a kelvin."""
     return _cooler(s, rng, width=0.4, power=1.0, water=False)
 
 
 @makes("link", CIRCUIT)
-def cooler_air_proportional(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def cooler_air_proportional(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """An air cooler with a proportional valve behind a lag."""
     return _cooler(s, rng, width=5.0, power=0.7, water=False)
 
 
-def _cooler(s: Setting, rng: np.random.Generator, *, width: float, power: float, water: bool) -> ZooEffect:
+def _cooler(s: EffectSetting, rng: np.random.Generator, *, width: float, power: float, water: bool) -> ZooEffect:
     T_on, tau = s.quantile("oil", float(rng.uniform(0.4, 0.8))), s.lag(rng, 400.0)
     parts = s.follower("valve feeler", "oil", tau)
     cold = _below_air(s, rng)
@@ -183,7 +183,7 @@ def _cooler(s: Setting, rng: np.random.Generator, *, width: float, power: float,
 
 
 @makes("link", CIRCUIT)
-def cooler_constant(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def cooler_constant(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """A water cooler that always runs, a little better with thin oil."""
     T, T0, cold = s.temperature("oil"), s.quantile("oil", 0.5), _below_air(s, rng)
     law: Law = lambda m: np.exp((T(m) - T0) / 80.0)  # noqa: E731
@@ -192,7 +192,7 @@ def cooler_constant(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("link", CIRCUIT)
-def cooler_shaft_driven(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def cooler_shaft_driven(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """An air cooler whose fan sits on the shaft and stalls."""
     x, x0 = s.speed(), float(rng.uniform(0.2, 0.6))
     act = s.bridge("oil", s.air(), lambda m: x(m) / (x(m) + x0), called=AIR)
@@ -200,7 +200,7 @@ def cooler_shaft_driven(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("link", CIRCUIT)
-def oil_jet(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def oil_jet(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """Oil of fixed temperature is injected as long as the shaft turns."""
     x, T = s.speed(), s.air_mean + float(rng.uniform(0.2, 0.6)) * s.rise
     act = s.bridge("oil", "jet", lambda m: np.tanh(x(m) / 0.05), parts=s.boundary("jet", constant(T)))
@@ -208,7 +208,7 @@ def oil_jet(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("link", CIRCUIT)
-def oil_tank(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def oil_tank(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """A tank outside with a pump whose flow follows the root of speed."""
     x, size = s.speed(), float(rng.uniform(1.0, 4.0)) * _capacity(s, "oil")
     to_air = 0.3 * s.shed
@@ -217,7 +217,7 @@ def oil_tank(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("source", CIRCUIT)
-def heater_thermostat(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def heater_thermostat(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """A heater at rest whose power falls smoothly as the oil warms."""
     x, T = s.speed(), s.temperature("oil")
     T_off = s.quantile("oil", float(rng.uniform(0.3, 0.7)))
@@ -226,7 +226,7 @@ def heater_thermostat(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("link_factor", CIRCUIT)
-def pump_fast_stage(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def pump_fast_stage(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """The circulation runs smoothly faster when the oil is warm."""
     T, T_on = s.temperature("oil"), s.quantile("oil", float(rng.uniform(0.4, 0.8)))
     names = s.link_between(("oil",), s.group("returns"))
@@ -238,7 +238,7 @@ def pump_fast_stage(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("source", AROUND)
-def solar_soak(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def solar_soak(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """Sun on the uppermost part: a bell over the hours of the day."""
     start, width = float(rng.uniform(0.0, 24.0)), float(rng.uniform(2.0, 3.5))
 
@@ -253,7 +253,7 @@ def solar_soak(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("link", AROUND)
-def rain_on_housing(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def rain_on_housing(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """Showers of an hour that rise and fall smoothly, on one part."""
     every, first = float(rng.uniform(3.0, 7.0)), float(rng.uniform(0.5, 2.5))
     act = s.bridge(
@@ -267,7 +267,7 @@ def rain_on_housing(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("signal", AROUND)
-def ambient_swing(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def ambient_swing(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """The air at the machine swings like a triangle, the probe's does not."""
     period = float(rng.uniform(3.0, 10.0))
     act = s.input_shift("T_ambient", lambda m: 2.0 * np.abs(2.0 * np.mod(m.hours / period, 1.0) - 1.0) - 1.0, sign=0)
@@ -275,17 +275,17 @@ def ambient_swing(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("signal", AROUND)
-def ambient_drift(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def ambient_drift(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """The air at the machine warms to a new temperature, the probe's does not."""
     tau = float(rng.uniform(0.02, 0.2)) * s.span
     act = s.input_shift("T_ambient", lambda m: -np.expm1(-m.hours / tau))
     return draft(act, "air at the machine + a (1 - exp(-t / tau))", 6.0, "K", tau_h=tau)
 
 
-def _below_air(s: Setting, rng: np.random.Generator) -> float:
+def _below_air(s: EffectSetting, rng: np.random.Generator) -> float:
     """Temperature of cooling water, [degC]."""
     return s.air_mean - float(rng.uniform(3.0, 12.0))
 
 
-def _capacity(s: Setting, node: str) -> float:
+def _capacity(s: EffectSetting, node: str) -> float:
     return sum(s.capacities(node).values())

@@ -8,7 +8,7 @@ import numpy as np
 
 from diagnosis.proof.zoo import effects
 from diagnosis.proof.zoo.effects import Maker, ZooEffect, draft
-from diagnosis.proof.zoo.setting import Setting, UnfitError, pick, soft
+from diagnosis.proof.zoo.setting import EffectSetting, UnfitError, pick, soft
 from diagnosis.proof.zoo.structure import Law, constant
 
 LOSS_MAKERS: dict[str, Maker] = {}
@@ -18,7 +18,7 @@ SLIDING, CHURNING = ("mesh_sliding", "gears_load"), ("churning", "gears_no_load"
 
 
 @makes("source", NO_LOAD)
-def windage(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def windage(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """Between the square and the cube of speed, half of it into the oil."""
     x, p = s.speed(), float(rng.uniform(1.8, 2.3))
     law: Law = lambda m: 0.5 * x(m) ** p * (1.0 + x(m))  # noqa: E731
@@ -27,7 +27,7 @@ def windage(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("source", NO_LOAD)
-def pocketing(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def pocketing(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """Exponential in speed."""
     x, k = s.speed(), float(rng.uniform(2.0, 3.5))
     act = s.heat("oil", lambda m: np.expm1(k * x(m)) / np.expm1(k), is_loss=True)
@@ -35,7 +35,7 @@ def pocketing(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("source", NO_LOAD)
-def churning_swirl(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def churning_swirl(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """Above a soft threshold with the power 1.4 of speed."""
     x, x0 = s.speed(), float(rng.uniform(0.35, 0.7))
     act = s.heat("oil", lambda m: x(m) ** 1.4 * soft((x(m) - x0) / 0.05), is_loss=True)
@@ -43,7 +43,7 @@ def churning_swirl(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("source", LOAD)
-def churning_load(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def churning_load(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """Grows with the root of torque."""
     x, y, p = s.speed(), s.load(), float(rng.uniform(0.8, 1.2))
     act = s.heat("oil", lambda m: np.sqrt(y(m)) * x(m) ** p, is_loss=True)
@@ -51,7 +51,7 @@ def churning_load(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("loss_factor", NO_LOAD)
-def oil_level_thermal(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def oil_level_thermal(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """Saturating function of the oil's temperature."""
     T, T0 = s.temperature("oil"), s.quantile("oil", 0.1)
     width = max(0.5 * (s.quantile("oil", 0.95) - T0), 3.0) * float(rng.uniform(0.8, 1.4))
@@ -60,7 +60,7 @@ def oil_level_thermal(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("loss_factor", LOAD)
-def splash_starvation(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def splash_starvation(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """A soft step of sliding friction at a speed."""
     x, x0 = s.speed(), float(rng.uniform(0.4, 0.7))
     act = s.loss_factor(s.losses(*SLIDING), lambda m: soft((x(m) - x0) / 0.08))
@@ -68,7 +68,7 @@ def splash_starvation(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("loss_factor", LOAD)
-def misalignment(s: Setting, _: np.random.Generator) -> ZooEffect:
+def misalignment(s: EffectSetting, _: np.random.Generator) -> ZooEffect:
     """Teeth wind straight under load: less at high torque; a bearing of the input shaft feels half of it."""
     y = s.load()
     act = s.loss_factor(s.losses(*SLIDING), lambda m: 1.0 / (0.5 + y(m)))
@@ -77,7 +77,7 @@ def misalignment(s: Setting, _: np.random.Generator) -> ZooEffect:
 
 
 @makes("loss_factor", LOAD)
-def bearing_preload(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def bearing_preload(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """A bearing warmer than its housing closes its clearance softly."""
     bearing = pick(s.group("bearings"), rng)
     T, wall = s.temperature(bearing), s.temperature(s.group("housing")[0])
@@ -87,7 +87,7 @@ def bearing_preload(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("loss_factor", LOAD)
-def bearing_additive(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def bearing_additive(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """Less friction of all bearings at low speed."""
     x, x0 = s.speed(), float(rng.uniform(0.2, 0.5))
     act = s.loss_factor(s.losses(*s.group("bearings")), lambda m: -1.0 / (1.0 + (x(m) / x0) ** 2), sign=-1)
@@ -95,7 +95,7 @@ def bearing_additive(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("source", NO_LOAD)
-def brake_drag(s: Setting, _: np.random.Generator) -> ZooEffect:
+def brake_drag(s: EffectSetting, _: np.random.Generator) -> ZooEffect:
     """Heat in the output shaft that falls off from proportional to speed."""
     x = s.speed()
     act = s.heat(s.group("shafts")[-1], lambda m: x(m) * (1.4 - 0.4 * x(m)), is_loss=True)
@@ -103,7 +103,7 @@ def brake_drag(s: Setting, _: np.random.Generator) -> ZooEffect:
 
 
 @makes("source", CIRCUIT)
-def pump_heat(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def pump_heat(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """A pump whose relief valve opens: constant above a speed."""
     x, x0 = s.speed(), float(rng.uniform(0.2, 0.5))
     act = s.heat("oil", lambda m: np.tanh(x(m) / x0), is_loss=True)
@@ -111,7 +111,7 @@ def pump_heat(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("loss_factor", AGEING)
-def run_in_flanks(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def run_in_flanks(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """Falls hyperbolically with the hours."""
     life = float(rng.uniform(0.03, 0.2)) * s.span
     act = s.loss_factor(s.losses(*SLIDING), lambda m: 1.0 / (1.0 + m.hours / life))
@@ -119,7 +119,7 @@ def run_in_flanks(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("loss_factor", AGEING)
-def run_in_seals(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def run_in_seals(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """Falls with the square root of the hours."""
     names = tuple(n for n in s.losses_all if "seal" in n)
     if not names:
@@ -130,7 +130,7 @@ def run_in_seals(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("loss_factor", AGEING)
-def oil_ageing(s: Setting, _: np.random.Generator) -> ZooEffect:
+def oil_ageing(s: EffectSetting, _: np.random.Generator) -> ZooEffect:
     """Churning and bearings grow with the root of the hours."""
     law: Law = lambda m: np.sqrt(m.hours / s.span)  # noqa: E731
     act = s.loss_factor((*s.losses(*CHURNING), *s.losses(*s.group("bearings"))), law)
@@ -138,7 +138,7 @@ def oil_ageing(s: Setting, _: np.random.Generator) -> ZooEffect:
 
 
 @makes("loss_factor", AGEING)
-def oil_loss(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def oil_loss(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """The level sinks to a lower one: less churning, less to warm, drier gears."""
     tau = float(rng.uniform(0.1, 0.4)) * s.span
     law: Law = lambda m: np.expm1(-m.hours / tau)  # noqa: E731
@@ -148,14 +148,14 @@ def oil_loss(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("loss_factor", AGEING)
-def gear_wear(s: Setting, _: np.random.Generator) -> ZooEffect:
+def gear_wear(s: EffectSetting, _: np.random.Generator) -> ZooEffect:
     """Grows with the square of the hours."""
     act = s.loss_factor(s.losses(*SLIDING), lambda m: (m.hours / s.span) ** 2)
     return draft(act, "mesh sliding (1 + a (t / span)^2)", 0.8)
 
 
 @makes("source", AGEING)
-def bearing_damage(s: Setting, rng: np.random.Generator) -> ZooEffect:
+def bearing_damage(s: EffectSetting, rng: np.random.Generator) -> ZooEffect:
     """One bearing grinds from a moment on, in proportion to speed."""
     bearing, x = pick(s.group("bearings"), rng), s.speed()
     at_h = s.date(rng, 0.05, 0.7)
@@ -164,7 +164,7 @@ def bearing_damage(s: Setting, rng: np.random.Generator) -> ZooEffect:
 
 
 @makes("signal", AGEING)
-def torque_decay(s: Setting, _: np.random.Generator) -> ZooEffect:
+def torque_decay(s: EffectSetting, _: np.random.Generator) -> ZooEffect:
     """The torque that is set is reached less and less, with the root of the hours."""
     s.load()
     act = s.input_shift("torque", lambda m: -m.inputs["torque"] * np.sqrt(m.hours / s.span), sign=-1)

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from diagnosis.proof.cases.time_course import ALWAYS, Course
+from diagnosis.proof.cases.time_course import ALWAYS, TimeCourse
 from diagnosis.proof.plant.instruments import lagged
 from models.base.types import Array
 
@@ -61,7 +61,7 @@ class Fault:
         Of ``heated``: channel of the warm neighbour
     strength : float
         >= 0, in the unit of its kind
-    course : Course
+    course : TimeCourse
         Of ``stuck`` only its start counts
     """
 
@@ -71,7 +71,7 @@ class Fault:
     near: str = ""
     strength: float
     sign: int = 1
-    course: Course = ALWAYS
+    course: TimeCourse = ALWAYS
 
     @property
     def what(self) -> Literal["sensor", "input", "clock"]:
@@ -181,19 +181,19 @@ def _spoiled_input(measured: Measured, fault: Fault) -> Array:
     return np.asarray(true + a * lagged(measured.readings[fault.near] - true, HEATED_TAU_S, measured.row_s))
 
 
-_Spoil = Callable[[Array, float, Array, Measured, Course], Array]
+_Spoil = Callable[[Array, float, Array, Measured, TimeCourse], Array]
 
 
-def _drifted(values: Array, a: float, share: Array, m: Measured, course: Course) -> Array:
+def _drifted(values: Array, a: float, share: Array, m: Measured, course: TimeCourse) -> Array:
     start = max(course.begins, 0.0)
     return np.asarray(values + a * np.clip(np.minimum(m.hours, course.ends) - start, 0.0, None) * (share > 0.0))
 
 
-def _slowed(values: Array, a: float, share: Array, m: Measured, _: Course) -> Array:
+def _slowed(values: Array, a: float, share: Array, m: Measured, _: TimeCourse) -> Array:
     return np.asarray((1.0 - share) * values + share * lagged(values, max(a, 1e-9), m.row_s))
 
 
-def _late(values: Array, a: float, share: Array, m: Measured, _: Course) -> Array:
+def _late(values: Array, a: float, share: Array, m: Measured, _: TimeCourse) -> Array:
     time = m.hours * 3600.0
     return np.asarray(np.interp(time - a * share, time, values))
 

@@ -13,15 +13,15 @@ from typing import cast
 import numpy as np
 from scipy.sparse import coo_array
 
-from diagnosis.proof.zoo.structure import Change, Law, Moment, ZooPlant
+from diagnosis.proof.zoo.structure import Law, Moment, ZooChange, ZooPlant
 from models.base.types import Array
 
 Key = tuple[str, str]
-Acting = Sequence[tuple[Change, Array | slice]]  # a change and the columns of a moment that it acts on
+Acting = Sequence[tuple[ZooChange, Array | slice]]  # a change and the columns of a moment that it acts on
 
 
 @dataclass(kw_only=True, eq=False)
-class Balance:
+class ZooBalance:
     """Heat balance of all bodies, one column per instant.
 
     Attributes
@@ -48,16 +48,16 @@ class Balance:
     made: list[Array]
 
 
-class Laws:
+class ZooLaws:
     """Laws of a plant in the order boundaries, paths, sources, capacities.
 
     Parameters
     ----------
-    bridges : sequence of Change
+    bridges : sequence of ZooChange
         Changes that add a path
     """
 
-    def __init__(self, plant: ZooPlant, bridges: Sequence[Change] = ()) -> None:
+    def __init__(self, plant: ZooPlant, bridges: Sequence[ZooChange] = ()) -> None:
         self.plant = plant
         self.bodies = [body.name for body in plant.bodies]
         self.body = {name: k for k, name in enumerate(self.bodies)}
@@ -158,7 +158,7 @@ class Laws:
         """Temperatures of bodies and boundaries."""
         return {**moment.T, **dict(zip(self.boundaries, values, strict=False))}
 
-    def balance(self, moment: Moment, values: Array, acting: Acting) -> Balance:
+    def balance(self, moment: Moment, values: Array, acting: Acting) -> ZooBalance:
         """Heat balance with all changes but those of inputs, which `moment` and `values` already hold."""
         _, G, P, C = np.split(values, self.cut)
         B = values.shape[1]
@@ -190,14 +190,14 @@ class Laws:
                     extra[self.body[change.other]] -= amount
                 extra_loss += change.is_loss * amount
             made.append(amount)
-        return Balance(T=T, G=G, C=C, q=self.spread @ P + extra, loss=self.is_loss @ P + extra_loss, made=made)
+        return ZooBalance(T=T, G=G, C=C, q=self.spread @ P + extra, loss=self.is_loss @ P + extra_loss, made=made)
 
     def matrix(self, G: Array) -> Array:
         """Conductances between bodies, shape (B, bodies, bodies), [W/K]."""
         n = len(self.bodies)
         return np.ascontiguousarray((self.to_matrix @ G).T).reshape(-1, n, n)
 
-    def heat_from_boundaries(self, balance: Balance) -> Array:
+    def heat_from_boundaries(self, balance: ZooBalance) -> Array:
         """Conductance to a boundary times its temperature, shape (bodies, B), [W]."""
         if not self.from_boundary:
             return np.zeros_like(balance.q)

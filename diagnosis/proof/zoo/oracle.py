@@ -79,7 +79,7 @@ class RecordingColumns:
     tool: Array
 
 
-class Design:
+class OracleDesign:
     """All that does not depend on the effect: the whitened columns of the training recordings.
 
     Parameters

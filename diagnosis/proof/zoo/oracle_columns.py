@@ -17,10 +17,10 @@ import numpy as np
 
 from diagnosis.proof.plant.cycles import TRAIN, Programme
 from diagnosis.proof.plant.instruments import Instruments
-from diagnosis.proof.zoo.oracle import LOSS, MEAN_S, Design, RecordingColumns, averaged
+from diagnosis.proof.zoo.oracle import LOSS, MEAN_S, OracleDesign, RecordingColumns, averaged
 from diagnosis.proof.zoo.run import follow, read_probes
-from diagnosis.proof.zoo.simulate import Direction, Linearised, ParameterDirection, StartDirection
-from diagnosis.proof.zoo.structure import Change, Law, Moment, Probe, ZooPlant, constant, times
+from diagnosis.proof.zoo.simulate import Direction, LinearRun, ParameterDirection, StartDirection
+from diagnosis.proof.zoo.structure import Law, Moment, Probe, ZooChange, ZooPlant, constant, times
 from models.base.types import Array
 
 SMOOTH_SD, LUMPED_SD, MIXING_SD, SENSOR_K = 0.04, 0.1, 0.04, 0.1
@@ -33,7 +33,7 @@ TOGETHER = 250  # directions that are simulated at once
 FARTHEST = 3.0  # standard deviations, where coordinates are held
 
 
-def design_of(plant: ZooPlant, programmes: Sequence[Programme], instruments: Instruments) -> Design:
+def design_of(plant: ZooPlant, programmes: Sequence[Programme], instruments: Instruments) -> OracleDesign:
     """The oracle's design of one plant; of `programmes` those whose name starts with ``train`` count.
 
     Parameters
@@ -41,15 +41,15 @@ def design_of(plant: ZooPlant, programmes: Sequence[Programme], instruments: Ins
     plant : ZooPlant
         Healthy
     """
-    runs = [Linearised(plant, one) for one in programmes if one.name.startswith(TRAIN)]
+    runs = [LinearRun(plant, one) for one in programmes if one.name.startswith(TRAIN)]
     parameters = [ParameterDirection(name=n, step=sd * plant.parameters[n]) for n, sd in plant.spread.items()]
     smooth = _Smooth(plant, runs)
     errors = [*_errors_of_laws(plant, smooth), *_errors_of_splits(plant), *_errors_of_inputs(plant)]
-    return Design([_columns(run, instruments, parameters, errors) for run in runs])
+    return OracleDesign([_columns(run, instruments, parameters, errors) for run in runs])
 
 
 def _columns(
-    run: Linearised,
+    run: LinearRun,
     instruments: Instruments,
     parameters: Sequence[Direction],
     errors: Sequence[Direction],
@@ -101,7 +101,7 @@ def _white(instruments: Instruments, loss: Array, probes: int, per_mean: int) ->
     return np.asarray(np.stack(rows) / np.sqrt(per_mean))
 
 
-def _responses(run: Linearised, directions: Sequence[Direction], channels: Sequence[str], per_mean: int) -> Array:
+def _responses(run: LinearRun, directions: Sequence[Direction], channels: Sequence[str], per_mean: int) -> Array:
     """Means of the channels along directions, shape (directions, channels, means)."""
     found = []
     for first in range(0, len(directions), TOGETHER):
@@ -145,7 +145,7 @@ def _random_heat(plant: ZooPlant, programme: Programme, body: str, watts: Array)
     knots = np.linspace(first, last, 2 + int((last - first) / max(KNOTS_S / 3600.0, 0.5 * tau_h, row_h)))
     apart = np.abs(np.subtract.outer(knots, knots))
     root = np.linalg.cholesky(sd**2 * np.exp(-apart / tau_h) + 1e-12 * sd**2 * np.eye(len(knots)))
-    changes = [Change(kind="heat", target=body, law=_hat(float(knot), float(knots[1] - knots[0]))) for knot in knots]
+    changes = [ZooChange(kind="heat", target=body, law=_hat(float(knot), float(knots[1] - knots[0]))) for knot in knots]
     return _Local(directions=changes, root=root)
 
 
@@ -159,7 +159,7 @@ def _hat(knot_h: float, width_h: float) -> Law:
 class _Smooth:
     """Polynomial features of degree 2 of the operating point, for a function of a given standard deviation."""
 
-    def __init__(self, plant: ZooPlant, runs: Sequence[Linearised]) -> None:
+    def __init__(self, plant: ZooPlant, runs: Sequence[LinearRun]) -> None:
         self.inputs = [name for name in plant.inputs if not name.startswith("T_")]
         oil = [body.name for body in plant.bodies if body.part_of == "oil"]
         self.oil = oil[0] if oil else max(plant.probes[0].mix, key=lambda name: plant.probes[0].mix[name])
@@ -201,34 +201,34 @@ def _input(name: str) -> Law:
     return lambda m: m.inputs[name]
 
 
-def _errors_of_laws(plant: ZooPlant, smooth: _Smooth) -> Iterator[Change]:
+def _errors_of_laws(plant: ZooPlant, smooth: _Smooth) -> Iterator[ZooChange]:
     laws = [smooth.law(feature) for feature in range(smooth.count)]
     for source in plant.sources:
-        yield from (Change(kind="source", target=source.name, law=law) for law in laws)
+        yield from (ZooChange(kind="source", target=source.name, law=law) for law in laws)
     for path in plant.paths:
-        yield from (Change(kind="path", target=path.name, law=law) for law in laws)
-        yield Change(kind="path", target=path.name, law=constant(LUMPED_SD))
+        yield from (ZooChange(kind="path", target=path.name, law=law) for law in laws)
+        yield ZooChange(kind="path", target=path.name, law=constant(LUMPED_SD))
     for body in plant.bodies:
-        yield Change(kind="capacity", target=body.name, law=constant(LUMPED_SD))
+        yield ZooChange(kind="capacity", target=body.name, law=constant(LUMPED_SD))
 
 
-def _errors_of_splits(plant: ZooPlant) -> Iterator[Change]:
+def _errors_of_splits(plant: ZooPlant) -> Iterator[ZooChange]:
     """Heat of a source that goes to another of its bodies, or to a neighbour of the main one, instead."""
     bodies = {body.name for body in plant.bodies}
     for source in plant.sources:
         main = max(source.spread, key=lambda name: source.spread[name])
         for target in dict.fromkeys([*source.spread, *_next_to(plant, main)]):
             if target != main and target in bodies:
-                yield Change(kind="heat", target=target, other=main, law=times(LUMPED_SD, source.power))
+                yield ZooChange(kind="heat", target=target, other=main, law=times(LUMPED_SD, source.power))
 
 
-def _errors_of_inputs(plant: ZooPlant) -> Iterator[Change]:
+def _errors_of_inputs(plant: ZooPlant) -> Iterator[ZooChange]:
     for name in plant.inputs:
         if name.startswith("T_"):
-            yield Change(kind="input", target=name, law=constant(INPUT_K))
+            yield ZooChange(kind="input", target=name, law=constant(INPUT_K))
         else:
             gain = INPUT_GAIN.get(name, ORDINARY_GAIN)
-            yield Change(kind="input", target=name, law=times(gain, _input(name)))
+            yield ZooChange(kind="input", target=name, law=times(gain, _input(name)))
 
 
 def _errors_of_probe(

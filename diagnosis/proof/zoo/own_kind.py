@@ -11,26 +11,35 @@ from diagnosis.proof.plant.anatomy import AIR, FRAME, OIL, SPLASH, SUMP
 from diagnosis.proof.plant.cycles import TRAIN, Programme
 from diagnosis.proof.plant.effect import Concealed
 from diagnosis.proof.plant.instruments import Instruments, record
-from diagnosis.proof.plant.laws import Laws
-from diagnosis.proof.plant.plant import Moment as OwnMoment
-from diagnosis.proof.plant.plant import Plant
-from diagnosis.proof.plant.plant_run import EXPONENTS, INPUTS, ORDINARY_SPREAD, Individual, Run, factor_sd, run_plant
-from diagnosis.proof.zoo.oracle import LOSS, Design
+from diagnosis.proof.plant.laws import PlantLaws
+from diagnosis.proof.plant.plant import Plant, PlantMoment
+from diagnosis.proof.plant.plant_run import (
+    EXPONENTS,
+    INPUTS,
+    ORDINARY_SPREAD,
+    Individual,
+    PlantRun,
+    factor_sd,
+    run_plant,
+)
+from diagnosis.proof.zoo.oracle import LOSS, OracleDesign
 from diagnosis.proof.zoo.oracle_columns import design_of
 from diagnosis.proof.zoo.simulate import simulate
-from diagnosis.proof.zoo.structure import Body, Boundary, Law, Moment, Path, Probe, Source, Variant, ZooPlant
+from diagnosis.proof.zoo.structure import Body, Boundary, HeatPath, Law, Moment, Probe, Source, Variant, ZooPlant
 from models.base.types import Array
 from models.quantities.quantities import column_of_input
 
 MOMENTS_KEPT = 30
 
 
-def design_of_own_kind(plant: Plant, individual: Individual, runs: Sequence[Run], instruments: Instruments) -> Design:
+def design_of_own_kind(
+    plant: Plant, individual: Individual, runs: Sequence[PlantRun], instruments: Instruments
+) -> OracleDesign:
     """The oracle's design of a case of the own kind.
 
     Parameters
     ----------
-    runs : sequence of Run
+    runs : sequence of PlantRun
         All recordings; those whose name starts with ``train`` count
     """
     programmes = [as_programme(plant, run) for run in runs]
@@ -38,7 +47,7 @@ def design_of_own_kind(plant: Plant, individual: Individual, runs: Sequence[Run]
 
 
 def effect_on_readings(
-    plant: Plant, runs: Sequence[Run], instruments: Instruments, effects: Sequence[Concealed]
+    plant: Plant, runs: Sequence[PlantRun], instruments: Instruments, effects: Sequence[Concealed]
 ) -> list[Mapping[str, Array]]:
     """Noise-free readings with effects minus those without any, of the training recordings.
 
@@ -68,7 +77,7 @@ def effect_on_readings(
 
 
 def _by_wrong_inputs(
-    plant: Plant, run: Run, instruments: Instruments, wrong: Mapping[str, Array]
+    plant: Plant, run: PlantRun, instruments: Instruments, wrong: Mapping[str, Array]
 ) -> Mapping[str, Array]:
     """Readings that true inputs cause, less those that recorded inputs would, by channel."""
     zoo, right = as_zoo(plant, run.individual, instruments), as_programme(plant, run)
@@ -83,7 +92,7 @@ def _by_wrong_inputs(
 # ---------------------------------------------------------------------- the plant
 
 
-def as_programme(plant: Plant, run: Run) -> Programme:
+def as_programme(plant: Plant, run: PlantRun) -> Programme:
     """A run's programme; a random heat goes into the first node of its place."""
     driven, members = run.programme, plant.anatomy.members
     return replace(
@@ -107,7 +116,7 @@ def as_zoo(plant: Plant, individual: Individual, instruments: Instruments) -> Zo
     for k, path in enumerate(anatomy.paths):
         parts[path.name] = parts.get(path.name, 0) + 1
         name = f"{path.name}.{parts[path.name]}"
-        paths.append(Path(name=name, ends=path.ends, conductance=shared.conductance(k), part_of=path.name))
+        paths.append(HeatPath(name=name, ends=path.ends, conductance=shared.conductance(k), part_of=path.name))
     exponents = {name: getattr(individual, name) for name in EXPONENTS}
     return ZooPlant(
         family="own_kind",
@@ -172,7 +181,7 @@ class _SharedLaws:
             self.held = (m, laws.conductances(moment), losses, laws.capacity)
         return self.held
 
-    def _losses(self, m: Moment, laws: Laws, moment: OwnMoment) -> Array:
+    def _losses(self, m: Moment, laws: PlantLaws, moment: PlantMoment) -> Array:
         """Losses without their factors, kept for moments that differ in nothing that they read."""
         read = [m.inputs["speed"], m.inputs["torque"], *(m.T[name] for name in self.warm)]
         for known, losses in self.losses:
@@ -181,16 +190,16 @@ class _SharedLaws:
         self.losses = [*self.losses[-MOMENTS_KEPT:], (read, laws.losses_at_one(moment))]
         return self.losses[-1][1]
 
-    def _laws(self, m: Moment) -> Laws:
+    def _laws(self, m: Moment) -> PlantLaws:
         p = dict(m.p)
         exponents = {name: p.pop(name) - 1.0 for name in EXPONENTS}
-        return Laws(self.plant, p, reading=np.full(len(m.hours), self.reading), **exponents)
+        return PlantLaws(self.plant, p, reading=np.full(len(m.hours), self.reading), **exponents)
 
-    def _moment(self, m: Moment) -> OwnMoment:
+    def _moment(self, m: Moment) -> PlantMoment:
         B, anatomy = len(m.hours), self.plant.anatomy
         none = np.zeros(B)
         air = m.inputs["T_ambient"]
-        return OwnMoment(
+        return PlantMoment(
             hours=m.hours, speed=m.inputs["speed"], torque=m.inputs["torque"], air=air,
             air_speed=m.inputs["air_speed"],
             T=np.stack([air if node in (AIR, FRAME) else m.T[node] for node in anatomy.nodes], axis=1),

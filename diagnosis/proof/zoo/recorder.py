@@ -11,7 +11,7 @@ from diagnosis.proof.cases.conceal import DATA_SHEET, SLOW_LAG_S
 from diagnosis.proof.plant.cycles import Programme
 from diagnosis.proof.plant.instruments import Instruments, drop_readings
 from diagnosis.proof.zoo.faults import AMBIENT, Fault, Measured, hold_reading, spoiled
-from diagnosis.proof.zoo.structure import Outcome, ZooPlant
+from diagnosis.proof.zoo.structure import ZooOutcome, ZooPlant
 from models.base.types import Array
 
 SLOW_ROW_S = 60.0  # rows longer than this are means: less noise, lags do not show
@@ -49,7 +49,7 @@ def with_slow_sensors(plant: ZooPlant, rng: np.random.Generator) -> ZooPlant:
     return replace(plant, probes=probes)
 
 
-def measure(plant: ZooPlant, programme: Programme, outcome: Outcome, run: int) -> Measured:
+def measure(plant: ZooPlant, programme: Programme, outcome: ZooOutcome, run: int) -> Measured:
     """Recording of one run of a batch by perfect instruments."""
     first = programme.unrecorded
     rows = outcome.P_loss.shape[1]

@@ -13,14 +13,14 @@ from scipy.signal import lfilter
 
 from diagnosis.proof.plant.cycles import Programme
 from diagnosis.proof.plant.integrator import sdirk_step
-from diagnosis.proof.zoo.laws import Acting, Balance, Laws, feel
-from diagnosis.proof.zoo.structure import Change, Moment, Variant, ZooPlant
+from diagnosis.proof.zoo.laws import Acting, ZooBalance, ZooLaws, feel
+from diagnosis.proof.zoo.structure import Moment, Variant, ZooChange, ZooPlant
 from models.base.types import Array
 
 LONGEST_STEP_S = 200.0
 
 
-class Clock:
+class RunClock:
     """Rows and steps of a programme.
 
     Attributes
@@ -50,30 +50,24 @@ class Clock:
 
 
 @dataclass(kw_only=True, eq=False)
-class Run:
+class ZooRun:
     """Everything of a batch at its rows, those before the recording included.
 
     Attributes
     ----------
-    changes : list of Change
+    changes : list of ZooChange
         The different ones of all variants
     T_steps : Array, shape (steps + 1, bodies, B)
         [degC]
     made : list of Array, shape (rows, B)
         Heat of every different change in the step after a row, [W]
-    stored, given, shed : Array, shape (B,)
-        Heat of the whole run, [J]: in the bodies at the end less that at the start; by sources, random heats and
-        changes; left through boundaries
     """
 
-    clock: Clock
-    laws: Laws
-    changes: list[Change]
+    clock: RunClock
+    laws: ZooLaws
+    changes: list[ZooChange]
     T_steps: Array
     made: list[Array]
-    stored: Array
-    given: Array
-    shed: Array
 
     @property
     def T(self) -> Array:
@@ -89,11 +83,11 @@ class Run:
         return moment, self.laws.values(moment)
 
 
-def integrate(plant: ZooPlant, programme: Programme, variants: Sequence[Variant]) -> Run:
+def integrate(plant: ZooPlant, programme: Programme, variants: Sequence[Variant]) -> ZooRun:
     """Integrate a batch."""
-    clock, B = Clock(plant, programme), len(variants)
+    clock, B = RunClock(plant, programme), len(variants)
     changes = list({id(change): change for variant in variants for change in variant.changes}.values())
-    laws = Laws(plant, [change for change in changes if change.kind == "bridge"])
+    laws = ZooLaws(plant, [change for change in changes if change.kind == "bridge"])
     acting: Acting = [
         (change, np.array([b for b, variant in enumerate(variants) if any(c is change for c in variant.changes)]))
         for change in changes
@@ -107,7 +101,6 @@ def integrate(plant: ZooPlant, programme: Programme, variants: Sequence[Variant]
     T = np.repeat(np.array([[programme.start[name]] for name in laws.bodies]), B, axis=1)
     before = T
     kept, made = np.empty((clock.steps + 1, n, B)), [np.zeros((clock.rows, B)) for _ in changes]
-    stored, given, shed = np.zeros(B), np.zeros(B), np.zeros(B)
     steady = np.empty(0)
     fresh: list[int] = []
     for step in range(clock.steps):
@@ -121,22 +114,16 @@ def integrate(plant: ZooPlant, programme: Programme, variants: Sequence[Variant]
         balance = laws.balance(moment, laws.values(moment, held=steady, fresh=fresh), acting)
         for name, watts in clock.random_heat.items():
             balance.q[laws.body[name]] += watts[step] * loud
-        inflow = laws.heat_from_boundaries(balance)
-        K = laws.matrix(balance.G)
-        new, mean = sdirk_step(T=T.T, capacity=balance.C.T, K=K, heat=(balance.q + inflow).T, dt=clock.dt)
+        heat = balance.q + laws.heat_from_boundaries(balance)
+        new, mean = sdirk_step(T=T.T, capacity=balance.C.T, K=laws.matrix(balance.G), heat=heat.T, dt=clock.dt)
         new, mean = new.T, mean.T
-        stored += (balance.C * (new - T)).sum(axis=0)
-        given += clock.dt * balance.q.sum(axis=0)
-        for path, body, _ in laws.from_boundary:
-            shed += clock.dt * balance.G[path] * mean[body]
-        shed -= clock.dt * inflow.sum(axis=0)
         if part == 0:
             _note_heat(laws, acting, balance, mean, (new - T) / clock.dt, [kept_heat[row] for kept_heat in made])
         before, T = T, new
     kept[-1] = T
     for kept_heat in made:
         kept_heat[-1] = kept_heat[-2] if clock.rows > 1 else 0.0
-    return Run(clock=clock, laws=laws, changes=changes, T_steps=kept, made=made, stored=stored, given=given, shed=shed)
+    return ZooRun(clock=clock, laws=laws, changes=changes, T_steps=kept, made=made)
 
 
 def _one_instant(m: Moment, k: int, *, T: Mapping[str, Array], p: Mapping[str, Array]) -> Moment:
@@ -166,7 +153,9 @@ def follow(seat: Array, lag_s: float, row_s: float) -> Array:
     return np.asarray(filtered)
 
 
-def _note_heat(laws: Laws, acting: Acting, balance: Balance, mean: Array, rate: Array, into: Sequence[Array]) -> None:
+def _note_heat(
+    laws: ZooLaws, acting: Acting, balance: ZooBalance, mean: Array, rate: Array, into: Sequence[Array]
+) -> None:
     """Write down what every change gave in a step, [W]."""
     where = {**balance.T, **dict(zip(laws.bodies, mean, strict=True))}
     for (change, _), made, row in zip(acting, balance.made, into, strict=True):

@@ -14,7 +14,18 @@ from typing import Literal
 import numpy as np
 
 from diagnosis.proof.plant.cycles import TRAIN, Programme
-from diagnosis.proof.zoo.structure import Body, Boundary, Change, Law, Moment, Outcome, Path, ZooPlant, constant, times
+from diagnosis.proof.zoo.structure import (
+    Body,
+    Boundary,
+    HeatPath,
+    Law,
+    Moment,
+    ZooChange,
+    ZooOutcome,
+    ZooPlant,
+    constant,
+    times,
+)
 from models.base.types import Array
 
 What = Literal["loss", "link", "capacity", "heat", "sensor", "input", "clock"]
@@ -59,7 +70,7 @@ class Parts:
 
     bodies: tuple[Body, ...] = ()
     boundaries: tuple[Boundary, ...] = ()
-    paths: tuple[Path, ...] = ()
+    paths: tuple[HeatPath, ...] = ()
     like: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -72,7 +83,7 @@ class Parts:
 class Act:
     """Changes of an effect at a strength of 1, and what they are called."""
 
-    changes: tuple[Change, ...] = ()
+    changes: tuple[ZooChange, ...] = ()
     changed: tuple[Changed, ...] = ()
     parts: Parts = Parts()
 
@@ -100,12 +111,12 @@ def soft(z: Array) -> Array:
     return np.asarray(0.5 * (1.0 + np.tanh(0.5 * z)))
 
 
-class Setting:
+class EffectSetting:
     """A plant and what an effect must know of it: which things belong to a nominal one, and usual sizes.
 
     Parameters
     ----------
-    healthy : Outcome
+    healthy : ZooOutcome
         Of one training recording without any effect, one run
     groups : mapping of str to tuple of str
         Nominal nodes by what they are: ``housing``, ``bearings``, ``shafts``, ``gears``, ``returns``
@@ -124,7 +135,7 @@ class Setting:
         self,
         plant: ZooPlant,
         programmes: Sequence[Programme],
-        healthy: Outcome,
+        healthy: ZooOutcome,
         groups: Mapping[str, tuple[str, ...]],
     ) -> None:
         self.plant, self.groups = plant, groups
@@ -259,7 +270,7 @@ class Setting:
     def heat(self, node: str, law: Law, *, sign: int = 1, is_loss: bool = False) -> Act:
         """Heat `law` [W] into a node; `sign` is what it mostly does."""
         changes = tuple(
-            Change(kind="heat", target=body, law=times(share, law), is_loss=is_loss)
+            ZooChange(kind="heat", target=body, law=times(share, law), is_loss=is_loss)
             for body, share in self.bodies(node).items()
         )
         return Act(changes=changes, changed=(Changed(what="heat", of=node, nodes=(node,), sign=sign, is_loss=is_loss),))
@@ -270,7 +281,7 @@ class Setting:
         sources = [s for s in self.plant.sources if any(is_part(s.part_of, name) for name in names)]
         nodes = {name: self._heated(name) for name in names}
         return Act(
-            changes=tuple(Change(kind="source", target=source.name, law=law) for source in sources),
+            changes=tuple(ZooChange(kind="source", target=source.name, law=law) for source in sources),
             changed=tuple(Changed(what=what, of=n, nodes=nodes[n], sign=sign, is_loss=is_loss) for n in names),
         )
 
@@ -292,7 +303,7 @@ class Setting:
         known = self.nodes
         return Act(
             changes=tuple(
-                Change(kind="path", target=p.name, law=law)
+                ZooChange(kind="path", target=p.name, law=law)
                 for p in self.plant.paths
                 if any(is_part(p.part_of, name) for name in names)
             ),
@@ -305,7 +316,7 @@ class Setting:
     def bridge(self, node: str, other: str, law: Law, *, called: str = "", parts: Parts | None = None) -> Act:
         """A further way for heat of `law` [W/K] between a node and a body or boundary, called `called` in the truth."""
         changes = tuple(
-            Change(kind="bridge", target=body, other=other, law=times(share, law))
+            ZooChange(kind="bridge", target=body, other=other, law=times(share, law))
             for body, share in self.bodies(node).items()
         )
         changed = Changed(what="link", of=f"{node}-{called or other}", nodes=(node,), sign=1)
@@ -314,7 +325,7 @@ class Setting:
     def capacity(self, node: str, law: Law, *, sign: int = 1) -> Act:
         """Heat capacity of a node times ``1 + law``."""
         return Act(
-            changes=tuple(Change(kind="capacity", target=body, law=law) for body in self.bodies(node)),
+            changes=tuple(ZooChange(kind="capacity", target=body, law=law) for body in self.bodies(node)),
             changed=(Changed(what="capacity", of=node, nodes=(node,), sign=sign),),
         )
 
@@ -323,7 +334,7 @@ class Setting:
         if name not in self.plant.inputs:
             raise UnfitError(name)
         return Act(
-            changes=(Change(kind="input", target=name, law=law),),
+            changes=(ZooChange(kind="input", target=name, law=law),),
             changed=(Changed(what="input", of=name, nodes=(), sign=sign),),
         )
 
@@ -352,7 +363,9 @@ class Setting:
         small = 1e-4 * size
         return Parts(
             bodies=(Body(name=name, capacity=constant(small), part_of=""),),
-            paths=(Path(name=f"{name}-{body}", ends=(name, body), conductance=constant(small / tau_s), part_of=""),),
+            paths=(
+                HeatPath(name=f"{name}-{body}", ends=(name, body), conductance=constant(small / tau_s), part_of=""),
+            ),
             like={name: body},
         )
 
@@ -361,7 +374,7 @@ class Setting:
         air = self.air()
         return Parts(
             bodies=(Body(name=name, capacity=constant(capacity), part_of=""),),
-            paths=(Path(name=f"{name}-{air}", ends=(name, air), conductance=constant(to_air), part_of=""),),
+            paths=(HeatPath(name=f"{name}-{air}", ends=(name, air), conductance=constant(to_air), part_of=""),),
             like={name: ""},
         )
 

@@ -10,9 +10,9 @@ import numpy as np
 
 from diagnosis.proof.plant.cycles import Programme
 from diagnosis.proof.plant.integrator import GAMMA
-from diagnosis.proof.zoo.laws import Balance, feel
+from diagnosis.proof.zoo.laws import ZooBalance, feel
 from diagnosis.proof.zoo.run import integrate, read_probes
-from diagnosis.proof.zoo.structure import Change, Moment, Outcome, Variant, ZooPlant
+from diagnosis.proof.zoo.structure import Moment, Variant, ZooChange, ZooOutcome, ZooPlant
 from models.base.types import Array
 
 STEP_K, RELATIVE_STEP = 1e-3, 1e-5  # of differences of laws: temperatures [K], and parameters and inputs
@@ -21,7 +21,7 @@ ROWS_AT_ONCE = 200
 
 @dataclass(frozen=True, kw_only=True)
 class ParameterDirection:
-    """A direction of :class:`Linearised`: the parameter `name` of the plant grows by `step` per unit amplitude.
+    """A direction of :class:`LinearRun`: the parameter `name` of the plant grows by `step` per unit amplitude.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class ParameterDirection:
 
 @dataclass(frozen=True, kw_only=True)
 class StartDirection:
-    """A direction of :class:`Linearised`: bodies start warmer by these amounts per unit amplitude.
+    """A direction of :class:`LinearRun`: bodies start warmer by these amounts per unit amplitude.
 
     Attributes
     ----------
@@ -46,10 +46,10 @@ class StartDirection:
     start: Mapping[str, float]
 
 
-Direction = Change | ParameterDirection | StartDirection
+Direction = ZooChange | ParameterDirection | StartDirection
 
 
-def simulate(plant: ZooPlant, programme: Programme, variants: Sequence[Variant]) -> Outcome:
+def simulate(plant: ZooPlant, programme: Programme, variants: Sequence[Variant]) -> ZooOutcome:
     """Integrate variants of a plant over one programme, all in one batch.
 
     Parameters
@@ -60,7 +60,7 @@ def simulate(plant: ZooPlant, programme: Programme, variants: Sequence[Variant])
 
     Returns
     -------
-    Outcome
+    ZooOutcome
         Of the recorded rows. ``heat`` is the mean over the step after a row; of a change of a capacity it is the heat
         that the capacity gives, of an input zero.
     """
@@ -80,7 +80,7 @@ def simulate(plant: ZooPlant, programme: Programme, variants: Sequence[Variant])
         {i: run.made[place[id(change)]][first:, b] for i, change in enumerate(variant.changes)}
         for b, variant in enumerate(variants)
     ]
-    return Outcome(
+    return ZooOutcome(
         T={name: values[:, first:] for name, values in whole.items()},
         readings=read_probes(plant, whole, first),
         P_loss=np.stack(P_loss),
@@ -107,7 +107,7 @@ class _Push:
     start: Array
 
 
-class Linearised:
+class LinearRun:
     """A run of the plant as it is, and its linear time steps for any number of directions.
 
     The derivatives of its heat balance are differences of laws, every law over all steps at once; the directions go
@@ -133,7 +133,7 @@ class Linearised:
 
     def _evaluate(
         self, raw: Moment, held: Array | None = None, fresh: Sequence[int] | None = None
-    ) -> tuple[Balance, Array]:
+    ) -> tuple[ZooBalance, Array]:
         values = self.laws.values(raw, held=held, fresh=fresh)
         return self.laws.balance(raw, values, ()), values
 
@@ -157,7 +157,7 @@ class Linearised:
 
     # ------------------------------------------------------------------ derivatives of the heat balance
 
-    def _forces(self, base: Balance, moved: Balance, T: Array, rate: Array, step: float) -> Array:
+    def _forces(self, base: ZooBalance, moved: ZooBalance, T: Array, rate: Array, step: float) -> Array:
         """Derivative of ``q - K T - C dT/dt`` between two balances at temperatures of bodies, (bodies, columns)."""
         laws = self.laws
         force = (moved.q - base.q - (moved.C - base.C) * rate) / step
@@ -174,7 +174,7 @@ class Linearised:
             force[body] += moved.G[path] * (moved.T[boundary] - base.T[boundary]) / step
         return np.asarray(force)
 
-    def _both_stages(self, moved: Balance, step: float) -> tuple[Array, Array]:
+    def _both_stages(self, moved: ZooBalance, step: float) -> tuple[Array, Array]:
         return tuple(self._forces(self.base, moved, T, rate, step) for T, rate in self.stages)  # type: ignore[return-value]
 
     @cached_property
@@ -194,13 +194,13 @@ class Linearised:
             J_out[:, :, k] = (self._outputs(moved) - self._outputs(self.base_rows)).T / STEP_K
         return J[0], J[1], J_out
 
-    def _outputs(self, balance: Balance) -> Array:
+    def _outputs(self, balance: ZooBalance) -> Array:
         """Loss and the temperatures of boundaries, shape (outputs, columns)."""
         return np.stack([balance.loss, *(balance.T[name] for name in self.laws.boundaries)])
 
     def _moved(
         self, raw: Moment, values: Array, kind: str, name: str, step: Array | float, fresh: list[int]
-    ) -> Balance:
+    ) -> ZooBalance:
         field = dict(getattr(raw, kind))
         field[name] = field[name] + step
         return self._evaluate(replace(raw, **{kind: field}), values, fresh)[0]  # type: ignore[arg-type]
@@ -228,7 +228,7 @@ class Linearised:
         pushed = np.flatnonzero(np.any((early != 0.0) | (late != 0.0), axis=1))
         return _Push(into={int(k): (early[k], late[k]) for k in pushed}, outputs=dict(enumerate(direct)), start=still)
 
-    def _push_of_change(self, change: Change, still: Array) -> _Push:
+    def _push_of_change(self, change: ZooChange, still: Array) -> _Push:
         """Forces of a change without a balance of all bodies."""
         laws = self.laws
         amount = np.broadcast_to(change.law(self.whole), self.clock.steps)

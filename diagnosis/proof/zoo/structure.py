@@ -80,7 +80,7 @@ class Boundary:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Path:
+class HeatPath:
     """A way for heat between two bodies, or a body and a boundary.
 
     Attributes
@@ -168,7 +168,7 @@ class ZooPlant:
     inputs: tuple[str, ...]
     bodies: tuple[Body, ...]
     boundaries: tuple[Boundary, ...]
-    paths: tuple[Path, ...]
+    paths: tuple[HeatPath, ...]
     sources: tuple[Source, ...]
     probes: tuple[Probe, ...]
     parameters: Mapping[str, float]
@@ -178,7 +178,7 @@ class ZooPlant:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Change:
+class ZooChange:
     """A departure of one run from its plant: a concealed effect, or a direction in which an oracle looks.
 
     Attributes
@@ -216,12 +216,12 @@ class Variant:
     """
 
     parameters: Mapping[str, float] = field(default_factory=dict)
-    changes: tuple[Change, ...] = ()
+    changes: tuple[ZooChange, ...] = ()
     quiet: bool = False
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Outcome:
+class ZooOutcome:
     """Result of the recorded rows of B runs.
 
     Attributes

@@ -13,7 +13,7 @@ from diagnosis.proof.zoo.effects import ZooEffect
 from diagnosis.proof.zoo.faults import Fault, spoiled
 from diagnosis.proof.zoo.recorder import measure
 from diagnosis.proof.zoo.setting import Changed
-from diagnosis.proof.zoo.structure import Change, Outcome, ZooPlant
+from diagnosis.proof.zoo.structure import ZooChange, ZooOutcome, ZooPlant
 from models.base.types import Array
 
 NO_NATS = {"D_plant_nats": None, "D_tool_nats": None}  # evidence where nothing is concealed
@@ -144,7 +144,9 @@ def _kelvin(case: ZooCase, run: int) -> dict[str, Any]:
     return sizes_of(changes)
 
 
-def _heat_of(plant: ZooPlant, outcome: Outcome, run: int, none: int, changes: Sequence[Change]) -> dict[str, Array]:
+def _heat_of(
+    plant: ZooPlant, outcome: ZooOutcome, run: int, none: int, changes: Sequence[ZooChange]
+) -> dict[str, Array]:
     """Heat by nominal node, [W]; of a changed input what the losses differ by, at the node ``losses``."""
     home = {body.name: body.part_of.split("+")[0] for body in plant.bodies}
     ends = {path.name: path.ends for path in plant.paths}

@@ -8,7 +8,7 @@ from pathlib import PurePath
 import numpy as np
 
 from diagnosis.proof.plant.cycles import ROW_S, ornstein_uhlenbeck
-from diagnosis.proof.zoo.structure import Body, Boundary, Law, Moment, Path, Probe, Source, ZooPlant
+from diagnosis.proof.zoo.structure import Body, Boundary, HeatPath, Law, Moment, Probe, Source, ZooPlant
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 
@@ -33,7 +33,7 @@ class Builder:
         self.links = frozenset(link.name for link in gearbox.network().links)
         self.bodies: list[Body] = []
         self.boundaries: list[Boundary] = []
-        self.paths: list[Path] = []
+        self.paths: list[HeatPath] = []
         self.sources: list[Source] = []
         self.probes: list[Probe] = []
         self.parameters: dict[str, float] = {}
@@ -91,7 +91,7 @@ class Builder:
             return value * m.p[common] if common else value
 
         self.paths.append(
-            Path(name=name, ends=(a, b), conductance=law, part_of=self._link(a, b) if part_of is None else part_of)
+            HeatPath(name=name, ends=(a, b), conductance=law, part_of=self._link(a, b) if part_of is None else part_of)
         )
         return name
 

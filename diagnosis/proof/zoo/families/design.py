@@ -11,7 +11,7 @@ from models.base.types import Array
 
 
 @dataclass(frozen=True, kw_only=True)
-class Design:
+class GearboxDesign:
     """Structure and laws of one gearbox.
 
     Attributes

@@ -12,7 +12,7 @@ from models.assembly.gearbox import Gearbox
 
 
 @dataclass(frozen=True, kw_only=True)
-class Family:
+class PlantFamily:
     """Plants of one kind.
 
     Attributes

@@ -15,7 +15,7 @@ from diagnosis.proof.plant.anatomy import AIR, FRAME
 from diagnosis.proof.plant.sizes import T_SERVICE
 from diagnosis.proof.zoo.families import films, losses
 from diagnosis.proof.zoo.families.builder import Builder, wander
-from diagnosis.proof.zoo.families.design import Design
+from diagnosis.proof.zoo.families.design import GearboxDesign
 from diagnosis.proof.zoo.families.losses import RPM
 from diagnosis.proof.zoo.families.sizes import Sizes
 from diagnosis.proof.zoo.structure import Law, Moment, ZooPlant, constant
@@ -27,7 +27,7 @@ OIL_TO_WALL = 0.4  # share of the oil's heat transfer that is left at rest
 SPAN_H = 80.0  # of a wandering draught before it repeats
 
 
-def build_gearbox(family: str, gearbox: Gearbox, design: Design, rng: np.random.Generator) -> ZooPlant:
+def build_gearbox(family: str, gearbox: Gearbox, design: GearboxDesign, rng: np.random.Generator) -> ZooPlant:
     """Put a gearbox together."""
     return _Gearbox(family, gearbox, design, rng).plant()
 
@@ -35,7 +35,7 @@ def build_gearbox(family: str, gearbox: Gearbox, design: Design, rng: np.random.
 class _Gearbox:
     """A gearbox in the making."""
 
-    def __init__(self, family: str, gearbox: Gearbox, design: Design, rng: np.random.Generator) -> None:
+    def __init__(self, family: str, gearbox: Gearbox, design: GearboxDesign, rng: np.random.Generator) -> None:
         self.sizes, self.design = Sizes(gearbox), design
         self.b = Builder(family, gearbox, ("speed", "torque", "T_ambient", "air_speed"), rng)
         self.gearbox, self.oil = gearbox, gearbox.lubricant()

@@ -11,17 +11,17 @@ import numpy as np
 
 from diagnosis.proof.plant.sizes import refuse_unbuilt
 from diagnosis.proof.zoo.families import films, losses
-from diagnosis.proof.zoo.families.design import Design
-from diagnosis.proof.zoo.families.family import Family
+from diagnosis.proof.zoo.families.design import GearboxDesign
+from diagnosis.proof.zoo.families.family import PlantFamily
 from diagnosis.proof.zoo.families.gearbox import build_gearbox
 from diagnosis.proof.zoo.structure import ZooPlant
 from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError
 
 MACHINES = ("fzg", "conveyor")
-GEARBOX_FAMILIES: list[Family] = []
+GEARBOX_FAMILIES: list[PlantFamily] = []
 
-DrawDesign = Callable[[Gearbox, np.random.Generator], Design]
+DrawDesign = Callable[[Gearbox, np.random.Generator], GearboxDesign]
 
 
 def _family(name: str, description: str) -> Callable[[DrawDesign], DrawDesign]:
@@ -37,20 +37,20 @@ def _family(name: str, description: str) -> Callable[[DrawDesign], DrawDesign]:
             refuse_unbuilt(gearbox)
             return build_gearbox(name, gearbox, draw_design(gearbox, rng), rng)
 
-        GEARBOX_FAMILIES.append(Family(name=name, description=description, machines=MACHINES, draw=draw))
+        GEARBOX_FAMILIES.append(PlantFamily(name=name, description=description, machines=MACHINES, draw=draw))
         return draw_design
 
     return enter
 
 
 @_family("walls", "thick walls in layers, seats, warmer air above")
-def draw_walls(gearbox: Gearbox, rng: np.random.Generator) -> Design:
+def draw_walls(gearbox: Gearbox, rng: np.random.Generator) -> GearboxDesign:
     """Thick walls: two or three bodies through every wall, a seat for every bearing, warmer air over the upper half.
 
     Friction of Schlenk without its least load, churning of Changenet and Velex 2007, bearings of Palmgren, seals of
     ISO/TR 14179-2, Gnielinski's plate.
     """
-    return Design(
+    return GearboxDesign(
         layers=int(rng.integers(2, 4)),
         seats=_coin(rng, 0.7),
         oil="mist" if _coin(rng, 0.4) else "sump",
@@ -67,13 +67,13 @@ def draw_walls(gearbox: Gearbox, rng: np.random.Generator) -> Design:
 
 
 @_family("rings", "bearings and shafts in detail")
-def draw_rings(gearbox: Gearbox, rng: np.random.Generator) -> Design:
+def draw_rings(gearbox: Gearbox, rng: np.random.Generator) -> GearboxDesign:
     """Bearings in detail: rings inner and outer, seats, shafts with ends, seals that heat shaft and wall.
 
     Friction of Benedict and Kelley, churning of Changenet et al. 2011, bearings of SKF without drag, Linke's seals, a
     box across a stream after Hilpert.
     """
-    return Design(
+    return GearboxDesign(
         layers=2 if _coin(rng, 0.4) else 1,
         seats=_coin(rng, 0.5),
         oil="sump" if _coin(rng, 0.5) else "mist",
@@ -92,13 +92,13 @@ def draw_rings(gearbox: Gearbox, rng: np.random.Generator) -> Design:
 
 
 @_family("splash", "oil as sump, mist and film; rims and hubs")
-def draw_splash(_: Gearbox, rng: np.random.Generator) -> Design:
+def draw_splash(_: Gearbox, rng: np.random.Generator) -> GearboxDesign:
     """Oil in three places, rim and hub: what the gears throw has its own temperature, and a film on the walls.
 
     Friction of Drozdov and Gavrikov, churning of Mauz, bearings of Palmgren, seals of ISO/TR 14179-1, gears as
     cylinders in oil after Becker, ISO/TR 14179-2 outside.
     """
-    return Design(
+    return GearboxDesign(
         layers=2 if _coin(rng, 0.5) else 1,
         oil="film" if _coin(rng, 0.6) else "mist",
         gears="rim",
@@ -116,13 +116,13 @@ def draw_splash(_: Gearbox, rng: np.random.Generator) -> Design:
 
 
 @_family("merged", "coarser than the model, on a bed")
-def draw_merged(gearbox: Gearbox, rng: np.random.Generator) -> Design:
+def draw_merged(gearbox: Gearbox, rng: np.random.Generator) -> GearboxDesign:
     """Coarser than the nominal model: gear and shaft are one rotor, bearings of a shaft one body, the box often too.
 
     Friction of O'Donoghue and Cameron, churning of Lauster and Boos, bearings of SKF, Linke's seals, McAdams'
     wall; the box stands on a bed that warms, or on a frame.
     """
-    return Design(
+    return GearboxDesign(
         one_box=_coin(rng, 0.6),
         layers=1 if _coin(rng, 0.5) else 2,
         oil="mist" if _coin(rng, 0.3) else "sump",
@@ -139,14 +139,14 @@ def draw_merged(gearbox: Gearbox, rng: np.random.Generator) -> Design:
 
 
 @_family("open", "couplings, shaft ends, bed and draughts")
-def draw_open(gearbox: Gearbox, rng: np.random.Generator) -> Design:
+def draw_open(gearbox: Gearbox, rng: np.random.Generator) -> GearboxDesign:
     """Open to its surroundings: couplings, shaft ends in air, a bed, draughts, warmer air above.
 
     Friction of Doleschel (solid and film mixed), churning of Changenet et al. 2011, bearings of Palmgren, seals of
     ISO/TR 14179-2, Churchill and Chu with a laminar plate.
     """
     flanges = _some_shafts(gearbox, rng, 0.6)
-    return Design(
+    return GearboxDesign(
         layers=2 if _coin(rng, 0.4) else 1,
         gears="rim" if _coin(rng, 0.4) else "one",
         shafts="halves" if _coin(rng, 0.6) else "one",

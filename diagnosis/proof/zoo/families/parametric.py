@@ -14,7 +14,7 @@ import numpy as np
 import sympy as sp
 
 from diagnosis.proof.zoo.families.builder import Builder, wander
-from diagnosis.proof.zoo.families.family import Family
+from diagnosis.proof.zoo.families.family import PlantFamily
 from diagnosis.proof.zoo.structure import Law, Moment, ZooPlant, constant, times
 from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError
@@ -32,7 +32,7 @@ SPAN_H = 1500.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Design:
+class MachineDesign:
     """Structure and laws of a machine without geometry.
 
     Attributes
@@ -74,7 +74,7 @@ def draw_blocks(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
     Free convection as dT^0.25 (McAdams, vertical wall), grey radiation (Stefan-Boltzmann); losses by drag as n^2 and a
     seal's n (ISO/TR 14179-2), load by Coulomb's law, m n.
     """
-    design = Design(
+    design = MachineDesign(
         split=float(rng.uniform(0.3, 0.8)),
         merge=0.0,
         free=float(rng.uniform(0.15, 0.33)),
@@ -95,7 +95,7 @@ def draw_streams(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
     Losses by a viscous film, (nu n)^(2/3) n (Palmgren), and by friction that falls with speed, m^1.2 n^0.8 nu^-0.05
     (Schlenk).
     """
-    design = Design(
+    design = MachineDesign(
         split=float(rng.uniform(0.0, 0.3)),
         merge=float(rng.uniform(0.2, 0.7)),
         free=0.0,
@@ -113,7 +113,7 @@ def draw_streams(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
 class _Machine:
     """A machine in the making."""
 
-    def __init__(self, family: str, gearbox: Gearbox, design: Design, rng: np.random.Generator) -> None:
+    def __init__(self, family: str, gearbox: Gearbox, design: MachineDesign, rng: np.random.Generator) -> None:
         if not isinstance(gearbox.definition, ParametricDefinition):
             raise InputError(
                 f"{gearbox.file}: has geometry; the family '{family}' splits definitions without: name another family"
@@ -367,13 +367,13 @@ class _Machine:
 
 
 PARAMETRIC_FAMILIES = (
-    Family(
+    PlantFamily(
         name="blocks",
         description="cores and skins, free convection, leaks",
         machines=("heated_rod", "la_haute_borne"),
         draw=draw_blocks,
     ),
-    Family(
+    PlantFamily(
         name="streams",
         description="merged parts, warmed air, draughts",
         machines=("heated_rod", "la_haute_borne"),

@@ -7,7 +7,7 @@ import importlib.util
 import sys
 from pathlib import Path
 
-from diagnosis.proof.zoo.families.family import Family
+from diagnosis.proof.zoo.families.family import PlantFamily
 from models.base.errors import InputError
 
 PROOF_FAMILIES = ("proof_a", "proof_b")
@@ -15,7 +15,7 @@ FOLDER = Path(__file__).parents[4] / "benchmarks" / "zoo_proof"
 PACKAGE = "zoo_proof"
 
 
-def load_proof_family(name: str) -> Family:
+def load_proof_family(name: str) -> PlantFamily:
     """Return a family that serves proof alone.
 
     Parameters
@@ -39,5 +39,5 @@ def load_proof_family(name: str) -> Family:
             raise ImportError(start)
         sys.modules[PACKAGE] = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(sys.modules[PACKAGE])
-    family: Family = importlib.import_module(f"{PACKAGE}.{name}").FAMILY
+    family: PlantFamily = importlib.import_module(f"{PACKAGE}.{name}").FAMILY
     return family

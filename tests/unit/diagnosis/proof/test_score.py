@@ -13,7 +13,7 @@ from builder.commands.cli import commands
 from builder.commands.prove import score as verb
 from diagnosis.proof.cases.conceal import PROOF_MIX, WHOLE, mix_of
 from diagnosis.proof.scoring.answers import read_answer
-from diagnosis.proof.scoring.lines import Settings, Task, compact, tasks_of
+from diagnosis.proof.scoring.lines import ProofSettings, Task, compact, tasks_of
 from diagnosis.proof.scoring.outcome import count, near_nodes, outcome, tables_of
 from diagnosis.proof.scoring.rules import RULES, Item
 from diagnosis.proof.scoring.truth import changed_of, read_truths, truth_of
@@ -274,7 +274,7 @@ def test_mix_keeps_every_group_and_the_number(cases: int) -> None:
 
 
 def test_tasks() -> None:
-    settings = Settings(plant="own", cells_every=2, removed=True)
+    settings = ProofSettings(plant="own", cells_every=2, removed=True)
     tasks = tasks_of(settings, ["a", "b", "c"], {"a": "windage", "c": "windage"})
     assert tasks[:4] == [Task(case="a"), Task(case="b"), Task(case="c"), Task(case="a", removed="windage")]
     assert len(tasks) == 4 + 2 * 8 and len(set(tasks)) == len(tasks)

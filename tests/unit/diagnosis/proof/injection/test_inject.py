@@ -14,7 +14,7 @@ from click.testing import CliRunner
 
 from builder.commands.conceal import conceal
 from diagnosis.proof.cases.case_files import write_cases
-from diagnosis.proof.cases.time_course import Course
+from diagnosis.proof.cases.time_course import TimeCourse
 from diagnosis.proof.injection.control import Control, find_control
 from diagnosis.proof.injection.inject import Injector, Wish, inject_set
 from diagnosis.proof.injection.instrument_faults import stuck, swapped
@@ -96,18 +96,18 @@ def test_gaps_before_a_fault_are_not_its_own(rod: Injector) -> None:
     two = tuple(one for one in rod.real.recording.channels if one.name in ("cell_1", "cell_2"))
     found = replace(rod.real.found, values={**rod.real.found.values, "T_cell_1": late})
     real = replace(rod.real, recording=replace(rod.real.recording, channels=two), found=found)
-    trial = swapped(real, "cell_1", Course(kind="step", begins=12000.0, ends=30000.0), np.random.default_rng(0))
+    trial = swapped(real, "cell_1", TimeCourse(kind="step", begins=12000.0, ends=30000.0), np.random.default_rng(0))
     for shift in trial.columns.values():
         assert (shift[0][real.time < 12000.0] == 0.0).all()
         assert np.abs(shift[0][real.time > 13000.0]).max() > 0.0
     with pytest.raises(InputError, match="cell_1 has no reading before 1000 s that it could be stuck at"):
-        stuck(real, "cell_1", Course(kind="step", begins=1000.0, ends=30000.0), np.random.default_rng(0))
+        stuck(real, "cell_1", TimeCourse(kind="step", begins=1000.0, ends=30000.0), np.random.default_rng(0))
 
 
 def test_a_changed_link_is_the_difference_of_two_simulations(rod: Injector, tmp_path: Path) -> None:
     truth, file = inject(rod, tmp_path, kind="link_factor", place="cell_5-cell_6", date="24000", seed=3)
     (changed,), (effect,) = truth["changed"], truth["effects"]
-    model, course = rod.model, Course(kind=changed["course"], begins=changed["from_s"], ends=changed["to_s"])
+    model, course = rod.model, TimeCourse(kind=changed["course"], begins=changed["from_s"], ends=changed["to_s"])
     # An independent way: the parameter of the link, held from block to block.
     base = model.base.temperatures
     rows = [{name: T[k] for name, T in base.items()} for k in range(len(model.cycle.time))]
@@ -188,7 +188,7 @@ def test_the_control_of_a_turbine_is_found() -> None:
 def test_a_control_holds_its_temperature_where_it_is_at_work(rod: Injector) -> None:
     late = rod.real.time > 20000.0
     control = Control(channel="cell_1", node="cell_1", acts_at="cell_2", low=0.0, high=9.0, active=late.astype(float))
-    course = Course(kind="step", begins=10000.0, ends=1e9)
+    course = TimeCourse(kind="step", begins=10000.0, ends=1e9)
     held, free = (
         np.abs(heat(replace(rod.model, control=found), "cell_1", course, np.random.default_rng(1)).K["cell_1"][-1])
         for found in (control, None)

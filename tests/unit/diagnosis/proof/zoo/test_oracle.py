@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.proof.zoo.oracle import FLOOR_TAU_S, LOSS, Design, RecordingColumns, whitened
+from diagnosis.proof.zoo.oracle import FLOOR_TAU_S, LOSS, OracleDesign, RecordingColumns, whitened
 from models.base.types import Array
 
 CHANNELS = ("oil", "housing", LOSS)
@@ -46,7 +46,7 @@ def test_equals_the_dense_quadratic_form() -> None:
     plant, tool = (np.concatenate([getattr(p, kind).reshape(n, -1) for p in parts], axis=1)
                    for kind, n in (("plant", 3), ("tool", 5)))  # fmt: skip
     whole = np.concatenate([values.ravel() for values in x])
-    nats = Design(parts).nats_of([by_channel(values) for values in x])
+    nats = OracleDesign(parts).nats_of([by_channel(values) for values in x])
     assert nats.plant == pytest.approx(0.5 * whole @ np.linalg.solve(noise + plant.T @ plant, whole), rel=1e-9)
     both = noise + plant.T @ plant + tool.T @ tool
     assert nats.tool == pytest.approx(0.5 * whole @ np.linalg.solve(both, whole), rel=1e-9)
@@ -64,9 +64,9 @@ def test_an_effect_that_an_unknown_can_mimic_has_no_evidence() -> None:
     rng = np.random.default_rng(3)
     part = columns(rng, 40)
     x = rng.standard_normal((3, 40))
-    free = Design([part]).nats_of([by_channel(x)])
+    free = OracleDesign([part]).nats_of([by_channel(x)])
     mimic = RecordingColumns(**{**vars(part), "tool": 1e4 * x[None]})
-    nats = Design([mimic]).nats_of([by_channel(x)])
+    nats = OracleDesign([mimic]).nats_of([by_channel(x)])
     assert nats.plant == pytest.approx(free.plant, rel=1e-12)
     assert nats.tool == pytest.approx(0.5e-8, rel=1e-2)  # what is left is the prior of the unknown: (1 / 1e4)^2 / 2
 
@@ -75,5 +75,5 @@ def test_means_leave_out_an_unfinished_one_and_a_silent_channel_is_zero() -> Non
     rng = np.random.default_rng(4)
     part = RecordingColumns(**{**vars(columns(rng, 10)), "rows": 123, "rows_per_mean": 12})
     x = rng.standard_normal(123)
-    whole = Design([part]).nats_of([{"oil": x, "housing": np.zeros(123)}])
-    assert Design([part]).nats_of([{"oil": np.concatenate([x[:120], [9.0, 9.0, 9.0]])}]) == whole
+    whole = OracleDesign([part]).nats_of([{"oil": x, "housing": np.zeros(123)}])
+    assert OracleDesign([part]).nats_of([{"oil": np.concatenate([x[:120], [9.0, 9.0, 9.0]])}]) == whole

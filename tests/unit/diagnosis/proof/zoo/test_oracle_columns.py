@@ -10,19 +10,19 @@ import pytest
 
 from diagnosis.proof.plant.cycles import Programme
 from diagnosis.proof.plant.instruments import Instruments
-from diagnosis.proof.zoo.oracle import LOSS, Design
+from diagnosis.proof.zoo.oracle import LOSS, OracleDesign
 from diagnosis.proof.zoo.oracle_columns import design_of
 from diagnosis.proof.zoo.simulate import simulate
 from diagnosis.proof.zoo.structure import (
     Body,
     Boundary,
-    Change,
+    HeatPath,
     Law,
     Moment,
-    Path,
     Probe,
     Source,
     Variant,
+    ZooChange,
     ZooPlant,
 )  # fmt: skip
 from models.base.types import Array
@@ -52,9 +52,9 @@ PLANT = ZooPlant(
             Body(name="wall", capacity=always(8000.0), part_of="housing"),
             Body(name="gear", capacity=always(1500.0), part_of="pinion")),
     boundaries=(Boundary(name="air", temperature=lambda m: m.inputs["T_ambient"] + m.p["warmer"], part_of="air"),),
-    paths=(Path(name="film", ends=("oil", "wall"), conductance=oil_to_wall, part_of="oil-housing"),
-           Path(name="shed", ends=("wall", "air"), conductance=parameter("shed"), part_of="housing-air"),
-           Path(name="splash", ends=("gear", "oil"), conductance=always(8.0), part_of="pinion-oil")),
+    paths=(HeatPath(name="film", ends=("oil", "wall"), conductance=oil_to_wall, part_of="oil-housing"),
+           HeatPath(name="shed", ends=("wall", "air"), conductance=parameter("shed"), part_of="housing-air"),
+           HeatPath(name="splash", ends=("gear", "oil"), conductance=always(8.0), part_of="pinion-oil")),
     sources=(Source(name="churning", power=churning, spread={"oil": 1.0}, is_loss=True, part_of="churning"),
              Source(name="mesh", power=lambda m: 0.0002 * m.inputs["speed"] * m.inputs["torque"],
                     spread={"gear": 0.9, "oil": 0.1}, is_loss=True, part_of="mesh_sliding")),
@@ -84,7 +84,7 @@ MEASUREMENT = Instruments(channels=("oil", "wall"), noise_K=0.02, quantum_K=0.01
 
 
 @pytest.fixture(scope="module")
-def design() -> Design:
+def design() -> OracleDesign:
     return design_of(PLANT, PROGRAMMES, MEASUREMENT)
 
 
@@ -100,7 +100,7 @@ def apart(variant: Variant, from_one: Variant | None = None, **start: float) -> 
 
 
 @pytest.mark.parametrize("name", PLANT.spread)
-def test_a_parameter_one_sd_off_is_worth_half_a_nat_at_most(design: Design, name: str) -> None:
+def test_a_parameter_one_sd_off_is_worth_half_a_nat_at_most(design: OracleDesign, name: str) -> None:
     step = 0.02  # of an sd, where the response is linear
     value = PLANT.parameters[name]
     x = apart(Variant(parameters={name: value * (1.0 + step * PLANT.spread[name])}))
@@ -113,26 +113,26 @@ def test_a_parameter_one_sd_off_is_worth_half_a_nat_at_most(design: Design, name
 @pytest.mark.parametrize(
     "change",
     [
-        Change(kind="source", target="mesh", law=always(0.02)),
-        Change(kind="path", target="splash", law=lambda m: 0.1 * (m.inputs["speed"] - 1500.0) / 1500.0),
-        Change(kind="capacity", target="gear", law=always(0.05)),
-        Change(kind="input", target="T_ambient", law=always(0.3)),
+        ZooChange(kind="source", target="mesh", law=always(0.02)),
+        ZooChange(kind="path", target="splash", law=lambda m: 0.1 * (m.inputs["speed"] - 1500.0) / 1500.0),
+        ZooChange(kind="capacity", target="gear", law=always(0.05)),
+        ZooChange(kind="input", target="T_ambient", law=always(0.3)),
     ],
 )
-def test_model_error_of_a_tool_explains_what_it_causes(design: Design, change: Change) -> None:
+def test_model_error_of_a_tool_explains_what_it_causes(design: OracleDesign, change: ZooChange) -> None:
     nats = design.nats_of(apart(Variant(changes=(change,))))
     assert nats.tool < 0.6
     assert nats.plant > 2.0 * nats.tool
 
 
-def test_a_sensor_that_is_off_by_its_tolerance(design: Design) -> None:
+def test_a_sensor_that_is_off_by_its_tolerance(design: OracleDesign) -> None:
     rows = ROWS - 60
     nats = design.nats_of([{"oil": np.full(rows, 1.0)}, {"oil": np.full(rows, 1.0)}])
     assert nats.tool < 50.0  # ten standard deviations
     assert nats.plant > 5.0 * nats.tool
 
 
-def test_start_temperatures_and_random_heat_are_no_evidence(design: Design) -> None:
+def test_start_temperatures_and_random_heat_are_no_evidence(design: OracleDesign) -> None:
     assert design.nats_of(apart(Variant(), oil=0.5, wall=0.5, gear=0.5)).plant < 0.75
     heat_of_its_own = design.nats_of(apart(Variant(), Variant(quiet=True))).plant
     unexplained = replace(PROGRAMMES[0], random_heat={}), replace(PROGRAMMES[1], random_heat={})
@@ -140,7 +140,7 @@ def test_start_temperatures_and_random_heat_are_no_evidence(design: Design) -> N
     assert heat_of_its_own < 0.5 * without
 
 
-def test_a_change_at_a_date_is_evidence_for_both(design: Design) -> None:
-    step = Change(kind="path", target="shed", law=lambda m: np.where(m.hours > 0.5, -0.5, 0.0))
+def test_a_change_at_a_date_is_evidence_for_both(design: OracleDesign) -> None:
+    step = ZooChange(kind="path", target="shed", law=lambda m: np.where(m.hours > 0.5, -0.5, 0.0))
     nats = design.nats_of(apart(Variant(changes=(step,))))
     assert nats.plant > nats.tool > 10.0

@@ -11,7 +11,7 @@ from diagnosis.proof.plant.cycles import Programme, reference_torque, top_speed
 from diagnosis.proof.plant.effect import Concealed
 from diagnosis.proof.plant.instruments import SENSOR_EFFECTS, Instruments, default_channels
 from diagnosis.proof.plant.plant import Plant
-from diagnosis.proof.plant.plant_run import Individual, Run, run_plant
+from diagnosis.proof.plant.plant_run import Individual, PlantRun, run_plant
 from diagnosis.proof.zoo.own_kind import as_programme, as_zoo, design_of_own_kind, effect_on_readings
 from diagnosis.proof.zoo.simulate import simulate
 from diagnosis.proof.zoo.structure import Variant
@@ -26,7 +26,7 @@ def plant(fzg: Gearbox) -> Plant:
 
 
 @pytest.fixture(scope="module")
-def run(plant: Plant, fzg: Gearbox) -> Run:
+def run(plant: Plant, fzg: Gearbox) -> PlantRun:
     n, M = top_speed(fzg), reference_torque(fzg)
     speed = np.concatenate([np.full(120, 0.4 * n), np.full(120, 0.7 * n)])
     inputs = {
@@ -38,7 +38,7 @@ def run(plant: Plant, fzg: Gearbox) -> Run:
     start = dict.fromkeys(plant.anatomy.nodes, 40.0)
     programme = Programme(name="train_1", inputs=inputs, start=start, unrecorded=30)
     who = Individual(factors=dict(fzg.factors) | {"mesh": 1.1, "C_oil": 0.9}, reading=1, oil_exponent=0.02)
-    return Run(individual=who, programme=programme)
+    return PlantRun(individual=who, programme=programme)
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +47,7 @@ def instruments(plant: Plant) -> Instruments:
     return Instruments(channels=channels, lag_s=dict.fromkeys(channels, 1e-3))
 
 
-def test_the_run_is_the_same(plant: Plant, run: Run, instruments: Instruments) -> None:
+def test_the_run_is_the_same(plant: Plant, run: PlantRun, instruments: Instruments) -> None:
     outcome = run_plant(plant, [run])[0]
     at_once = replace(instruments, lag_s=dict.fromkeys(instruments.channels, 0.0))
     zoo = simulate(as_zoo(plant, run.individual, at_once), as_programme(plant, run), [Variant()])
@@ -58,13 +58,12 @@ def test_the_run_is_the_same(plant: Plant, run: Run, instruments: Instruments) -
 
 @pytest.mark.slow
 def test_a_bias_counts_and_a_torque_within_its_tolerance_does_not(
-    plant: Plant, run: Run, instruments: Instruments
+    plant: Plant, run: PlantRun, instruments: Instruments
 ) -> None:
     design = design_of_own_kind(plant, run.individual, [run], instruments)
-    kinds = {effect.name: effect for effect in SENSOR_EFFECTS}
 
     def nats(name: str, place: str, a: float) -> float:
-        fault = Concealed(effect=kinds[name], places=(place,), parameters={"a": a}, strength=1.0)
+        fault = Concealed(effect=SENSOR_EFFECTS[name], places=(place,), parameters={"a": a}, strength=1.0)
         return design.nats_of(effect_on_readings(plant, [run], instruments, [fault])).tool
 
     assert nats("sensor_bias", "oil", 0.1) < 0.5
@@ -72,8 +71,10 @@ def test_a_bias_counts_and_a_torque_within_its_tolerance_does_not(
     assert 0.0 < nats("torque_gain", "torque", 0.01) < 0.5
 
 
-def test_a_wrong_recorded_input_counts_as_what_it_would_cause(plant: Plant, run: Run, instruments: Instruments) -> None:
-    kind = next(effect for effect in SENSOR_EFFECTS if effect.name == "ambient_probe_offset")
+def test_a_wrong_recorded_input_counts_as_what_it_would_cause(
+    plant: Plant, run: PlantRun, instruments: Instruments
+) -> None:
+    kind = SENSOR_EFFECTS["ambient_probe_offset"]
     fault = Concealed(effect=kind, places=("T_ambient",), parameters={"a": 2.0}, strength=1.0)
     x = effect_on_readings(plant, [run], instruments, [fault])[0]
     inputs = run.programme.inputs

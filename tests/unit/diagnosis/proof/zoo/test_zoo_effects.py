@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from diagnosis.proof.cases.case_files import write_case, write_cases
-from diagnosis.proof.cases.time_course import Course
+from diagnosis.proof.cases.time_course import TimeCourse
 from diagnosis.proof.plant import cycles
 from diagnosis.proof.zoo import draw
 from diagnosis.proof.zoo.case import ZooCase, ZooPlan, run_case
@@ -23,9 +23,9 @@ from diagnosis.proof.zoo.families import FAMILIES
 from diagnosis.proof.zoo.faults import Measured, spoiled
 from diagnosis.proof.zoo.oracle import OracleNats
 from diagnosis.proof.zoo.programmes import programmes
-from diagnosis.proof.zoo.setting import Setting, UnfitError
+from diagnosis.proof.zoo.setting import EffectSetting, UnfitError
 from diagnosis.proof.zoo.simulate import simulate
-from diagnosis.proof.zoo.structure import Outcome, Variant, ZooPlant
+from diagnosis.proof.zoo.structure import Variant, ZooOutcome, ZooPlant
 from diagnosis.proof.zoo.truth import truth_of
 from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError
@@ -60,24 +60,25 @@ def drawn(fzg: Gearbox) -> Drawn:
 
 
 @pytest.fixture(scope="module")
-def setting(fzg: Gearbox, drawn: Drawn) -> Setting:
+def setting(fzg: Gearbox, drawn: Drawn) -> EffectSetting:
     warm = drawn.programmes[2]
-    return Setting(drawn.plant, drawn.programmes, simulate(drawn.plant, warm, [Variant()]), fzg.network().groups)
+    return EffectSetting(drawn.plant, drawn.programmes, simulate(drawn.plant, warm, [Variant()]), fzg.network().groups)
 
 
-def case_of(drawn: Drawn, fzg: Gearbox, group: str, *effects: ZooEffect) -> ZooCase:
+def case_of(drawn: Drawn, group: str, *effects: ZooEffect) -> ZooCase:
     """A case with given effects, or with drawn ones."""
     plan = ZooPlan(family="walls", machine="fzg", seed=4, group=group)
-    if not effects:
-        return draw.draw_case_of(drawn, fzg, plan, name="case_001", session_deviation=0.03)
-    control = replace(plan, group="control", kind="clean")
-    healthy = draw.draw_case_of(drawn, fzg, control, name="case_001", session_deviation=0.03)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(draw, "draw_plant", lambda *_, **__: drawn)
+        if not effects:
+            return draw.draw_case(plan, session_deviation=0.03)
+        healthy = draw.draw_case(replace(plan, group="control", kind="clean"), session_deviation=0.03)
     case = draw.with_effects(replace(healthy, plan=plan), effects)
     case = replace(case, runs=run_case(case, "train", "hold", "baseline"))
     return replace(case, nats_of_effects=(OracleNats(plant=1.0, tool=1.0),) * len(effects))
 
 
-def moved(effect: ZooEffect, plant: ZooPlant, outcome: Outcome, run: int) -> float:
+def moved(effect: ZooEffect, plant: ZooPlant, outcome: ZooOutcome, run: int) -> float:
     """By how much a run differs from the first one in the direction of what the effect changed first."""
     change, changed = effect.changes[0], effect.changed[0]
     if change.kind in ("path", "bridge"):
@@ -108,7 +109,7 @@ def test_effects_keep_their_order_by_which_seeds_draw_them() -> None:
     assert list(ALL) == order.split()
 
 
-def test_every_effect_acts_in_the_direction_of_its_truth(setting: Setting, drawn: Drawn) -> None:
+def test_every_effect_acts_in_the_direction_of_its_truth(setting: EffectSetting, drawn: Drawn) -> None:
     rng, effects = np.random.default_rng(2), []
     for maker in ALL.values():
         try:
@@ -132,13 +133,15 @@ def test_every_effect_acts_in_the_direction_of_its_truth(setting: Setting, drawn
 
 
 @pytest.mark.parametrize("kind", ["step", "ramp", "from_to"])
-def test_a_date_counts_from_the_first_row_and_lasts(setting: Setting, drawn: Drawn, fzg: Gearbox, kind: str) -> None:
+def test_a_date_counts_from_the_first_row_and_lasts(
+    setting: EffectSetting, drawn: Drawn, fzg: Gearbox, kind: str
+) -> None:
     at_h = 0.5 * setting.programmes[0].begins_h + 0.25  # in train_1
     last = drawn.programmes[4]
     to_h = {"step": np.inf, "ramp": at_h + 0.1, "from_to": last.begins_h - 0.5}[kind]
-    course = Course(kind=kind, begins=at_h, ends=to_h)  # type: ignore[arg-type]
+    course = TimeCourse(kind=kind, begins=at_h, ends=to_h)  # type: ignore[arg-type]
     effect = replace(ALL["windage"](setting, np.random.default_rng(1)), course=course)
-    case = case_of(drawn, fzg, "date", effect.with_strength(0.2 * effect.cap))
+    case = case_of(drawn, "date", effect.with_strength(0.2 * effect.cap))
     shift = {p.name: case.runs.outcomes[p.name].readings["oil"] for p in case.recordings("train", "hold")}
     before = int(at_h * 360.0)
     first = shift["train_1"][0] - shift["train_1"][1]
@@ -149,13 +152,13 @@ def test_a_date_counts_from_the_first_row_and_lasts(setting: Setting, drawn: Dra
     assert (changed["recording"], changed["from_s"]) == ("train_1", pytest.approx(3600.0 * at_h))
 
 
-def test_faults_spoil_what_they_name_from_their_date_on(setting: Setting) -> None:
+def test_faults_spoil_what_they_name_from_their_date_on(setting: EffectSetting) -> None:
     hours = np.arange(400) / 360.0
     channels = [probe.channel for probe in setting.plant.probes]
     wave = {name: 40.0 + k + 10.0 * np.sin(hours * 6.0) for k, name in enumerate(channels)}
     inputs = {name: np.full(400, 20.0) for name in setting.plant.inputs}
     m = Measured(hours=hours, row_s=10.0, inputs=inputs, readings=wave, P_loss=np.zeros(400))
-    course = Course(kind="step", begins=0.5)
+    course = TimeCourse(kind="step", begins=0.5)
     before = hours < 0.5
     for name in draw.FAULT_MAKERS:
         if name == "heater_power_gain":
@@ -181,7 +184,7 @@ def test_faults_spoil_what_they_name_from_their_date_on(setting: Setting) -> Non
 
 @pytest.mark.parametrize("group", ["single", "sensor", "pair", "messy", "outside"])
 def test_strengths_follow_the_evidence_within_their_range(drawn: Drawn, fzg: Gearbox, group: str) -> None:
-    case = case_of(drawn, fzg, group)
+    case = case_of(drawn, group)
     assert all(0.0 < effect.strength <= effect.cap for effect in case.effects)
     dominant = case.effects[0]
     if dominant.least < dominant.strength < dominant.cap and dominant.fault is None:
@@ -196,7 +199,7 @@ def test_strengths_follow_the_evidence_within_their_range(drawn: Drawn, fzg: Gea
 
 
 def test_same_seed_same_bytes_and_healthy_baselines(
-    drawn: Drawn, fzg: Gearbox, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    drawn: Drawn, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(draw, "draw_plant", lambda *_, **__: drawn)
     plans = zoo_plans(5, {"sensor": 1}, families=["walls"], machine="fzg")
@@ -207,9 +210,9 @@ def test_same_seed_same_bytes_and_healthy_baselines(
     assert all((tmp_path / "a" / path).read_bytes() == (tmp_path / "b" / path).read_bytes() for path in files)
 
 
-def test_baselines_share_the_plant_up_to_the_deviation(drawn: Drawn, fzg: Gearbox, setting: Setting) -> None:
+def test_baselines_share_the_plant_up_to_the_deviation(drawn: Drawn, setting: EffectSetting) -> None:
     effect = ALL["windage"](setting, np.random.default_rng(1))
-    case = case_of(drawn, fzg, "single", effect)
+    case = case_of(drawn, "single", effect)
     off = [np.log(v / drawn.plant.parameters[n]) for n, v in case.sessions["baseline_1"].items()]
     assert len(off) == len(drawn.plant.spread) and 0.02 < np.std(off) < 0.04
     baseline = next(p for p in case.programmes if p.name == "baseline_1")
@@ -218,7 +221,7 @@ def test_baselines_share_the_plant_up_to_the_deviation(drawn: Drawn, fzg: Gearbo
     assert np.nanstd(recorded - healthy.readings["oil"][0]) < 0.25  # noise of 0.2 K
 
 
-def test_a_folder_that_cannot_be_written_is_named(drawn: Drawn, fzg: Gearbox, tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_written_is_named(drawn: Drawn, tmp_path: Path) -> None:
     (tmp_path / "case").write_text("a file, no folder")
     with pytest.raises(InputError, match="case: cannot be written"):
-        write_case(files_of_case(case_of(drawn, fzg, "control")), tmp_path / "case", None)
+        write_case(files_of_case(case_of(drawn, "control")), tmp_path / "case", None)
