@@ -16,6 +16,7 @@ from models.formulas.oil import kinematic_viscosity_d341
 from models.losses.shaft_loads import bearing_loads
 from models.network.laws import symbol
 from models.portable.evaluation import RPM
+from models.quantities.quantities import Input
 from models.simulation.thermal_network import ThermalNetwork
 
 SHARES = (("low", 0.1), ("mid", 0.5), ("rated", 1.0))  # of the largest speed, torque and other inputs
@@ -50,10 +51,12 @@ def understood(gearbox: Gearbox) -> list[Grid]:
         tables.append(_heats(gearbox, network))
     if "oil" in {part.name for part in network.parts}:
         tables.append(_oil(gearbox))
-    return tables if gearbox.is_parametric else [*tables, _steady(gearbox), _bearing_loads(gearbox), *_gears(gearbox)]
+    if gearbox.is_parametric:
+        return tables
+    return [*tables, _steady(gearbox, network), _bearing_loads(gearbox), *_gears(gearbox)]
 
 
-def _steady(gearbox: Gearbox) -> Grid:
+def _steady(gearbox: Gearbox, network: ThermalNetwork) -> Grid:
     """Where temperatures settle; nowhere, where losses rise faster than heat leaves."""
     parts = ["oil", *(part.name for part in gearbox.housing.part)]
     rows: list[list[str]] = [[name] for name in [*parts, "hottest bearing"]]
@@ -67,8 +70,14 @@ def _steady(gearbox: Gearbox) -> Grid:
         shown = [f"{T[name]:.1f}" if T[name] <= HOTTEST_DEGC else f"> {HOTTEST_DEGC:g}" for name in (*parts, hottest)]
         for row, value in zip(rows, [*shown[:-1], f"{shown[-1]} ({hottest})"], strict=True):
             row.append(value)
-    air = f"{gearbox.ambient_degC:g} degC ambient and {gearbox.ambient.air_speed_m_s:g} m/s of air"
-    return Grid(f"Where temperatures settle, in degC, at {air}", ["part", *(name for name, _ in SHARES)], rows)
+    inputs = network.inputs
+    at = _with_units({name: known.default for name, known in inputs.items() if not known.required}, inputs)
+    return Grid(f"Where temperatures settle, in degC, at {at}", ["part", *(name for name, _ in SHARES)], rows)
+
+
+def _with_units(values: Mapping[str, float], inputs: Mapping[str, Input]) -> str:
+    """Values of inputs with their units, for a title."""
+    return ", ".join(f"{name} {value:g} {inputs[name].quantity.unit}".rstrip() for name, value in values.items())
 
 
 def _gears(gearbox: Gearbox) -> Iterator[Grid]:
@@ -151,7 +160,11 @@ def _links(gearbox: Gearbox, network: ThermalNetwork) -> Grid:
         varies = sorted({s.name for s in link.conductance.free_symbols} - constants)
         rows.append([" - ".join(link.nodes), ", ".join(varies) or "constant", _number(found[link.name])])
     *_, warm = gearbox.definition.full_operation
+    read = {one.name for link in network.links for one in link.conductance.free_symbols}
+    mid = _signals(gearbox, network, dict(SHARES)["mid"])
+    at = _with_units({name: mid[name] for name in network.inputs if name in read}, network.inputs)
     title = f"{len(network.links)} links; conductances in W/K at mid operation, parts at {warm:g} degC"
+    title += f"\n({at})" if at else ""
     return Grid(title, ["between", "depends on", "W/K"], rows, 2)
 
 

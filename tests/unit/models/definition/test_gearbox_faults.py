@@ -141,7 +141,11 @@ FAULTS = [
         "diameter_mm = 240.0\nmodel",
         "seal 'seal_1'.diameter_mm: 240 mm on a shaft of 24 mm",
     ),
-    ("diameter_mm = { value = 24.0", "diameter_mm = { value = 8.0", "bearing 'bearing_1'.bore_mm: 30 mm on a shaft of 8 mm"),
+    (
+        "diameter_mm = { value = 24.0",
+        "diameter_mm = { value = 8.0",
+        "bearing 'bearing_1'.bore_mm: 30 mm on a shaft of 8 mm",
+    ),
     (
         "value = 0.215, sd = 0.005",
         "value = 0.1, sd = 0.005",
