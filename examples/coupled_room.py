@@ -1,6 +1,6 @@
 """A gearbox in a room: two native FMUs that exchange heat and temperature, as SSP, run by FMPy.
 
-    python examples/coupled_room.py [--gearbox-fmu out/fzg/fzg_native.fmu] [--output out/coupled_room]
+    python examples/coupled_room.py [--gearbox-fmu FMU] [--output out/coupled_room]
 
 What the gearbox gives to the air and through its feet (`air.heat_flow`, `frame.heat_flow`) warms a small room; the
 room's temperatures are the gearbox's `T_ambient` and `frame.T_in`. The FMU needs the second input: build it with
@@ -21,7 +21,7 @@ from fmpy.ssp import simulation
 from fmpy.ssp.ssd import Parameter, ParameterSet
 from vehicle_fmus import write_system
 
-from gearbox_twin import Gearbox, build_fmu, load_gearbox
+from gearbox_twin import Gearbox, InputError, build_fmu, load_gearbox
 
 HERE = Path(__file__).parent
 STOP_S, STEP_S = 4.0 * 3600.0, 10.0
@@ -82,7 +82,11 @@ def main() -> None:
     folder: Path = given.output
     folder.mkdir(parents=True, exist_ok=True)
     fmus = {"gearbox": given.gearbox_fmu or build_gearbox(folder / "gearbox"), "room": build_room(folder / "room")}
-    rows = run(write_system(folder / "room.ssp", HERE / "room.ssd", fmus))
+    try:
+        system = write_system(folder / "room.ssp", HERE / "room.ssd", fmus)
+    except InputError as error:
+        parser.error(str(error))
+    rows = run(system)
     print("time/h  oil/degC  room/degC  floor/degC  to air/W  to floor/W")
     for row in rows[359::360]:
         hours = (row["time"] + STEP_S) / 3600.0
@@ -91,7 +95,9 @@ def main() -> None:
         print(f"{hours:6.1f} {oil:9.1f} {room:10.1f} {floor:11.1f} {flows[0]:9.1f} {flows[1]:11.1f}")
     last = rows[-1]
     given_off = last["gearbox.air.heat"] + last["gearbox.frame.heat"]
+    elsewhere = last["gearbox.heat_in"] - given_off - last["gearbox.heat_stored"]  # to boundaries that no room has
     print(f"losses {last['gearbox.heat_in'] / 1e3:.1f} kJ = to air and floor {given_off / 1e3:.1f} kJ", end=" + ")
+    print(f"elsewhere {elsewhere / 1e3:.1f} kJ", end=" + ")
     print(f"stored in the gearbox {last['gearbox.heat_stored'] / 1e3:.1f} kJ")
     print(f"the room received {last['room.heat_in'] / 1e3:.1f} kJ (flows arrive one step later)")
 

@@ -20,7 +20,7 @@ import pandas as pd
 from fmpy.ssp.simulation import simulate_ssp
 from vehicle_fmus import build_cycle_fmu, build_vehicle_fmu, write_system
 
-from gearbox_twin import build_fmu
+from gearbox_twin import InputError, build_fmu
 
 HERE = Path(__file__).parent
 STOP_S, STEP_S = 1200.0, 0.1
@@ -147,12 +147,15 @@ def plot(run: Run, path: Path) -> None:
 def main() -> None:
     """Build, run, compare, plot."""
     parser = argparse.ArgumentParser(description="A gearbox in a vehicle over a drive cycle.")
-    parser.add_argument("--gearbox-fmu", type=Path, help="native FMU of build-fmu; built if it is not given")
+    parser.add_argument("--gearbox-fmu", type=Path, help="native FMU of the FZG rig; built if not given")
     parser.add_argument("--output", type=Path, default=Path("out/coupled_vehicle"))
     given = parser.parse_args()
     folder: Path = given.output
     folder.mkdir(parents=True, exist_ok=True)
-    ssp = build_system(folder, given.gearbox_fmu or build_gearbox(folder))
+    try:
+        ssp = build_system(folder, given.gearbox_fmu or build_gearbox(folder))
+    except InputError as error:
+        parser.error(str(error))
     run = run_fmpy(ssp)
     pd.DataFrame(run).iloc[9::10].round(6).to_csv(folder / "result.csv", index=False)
     plot(run, folder / "result.png")

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import numpy as np
+from fmpy import read_model_description
 from numpy.typing import ArrayLike
 
 from builder.fmi.model_description import FmuIdentity
@@ -22,6 +24,7 @@ from models.base.errors import InputError
 from models.base.version import license_text, project_version
 
 STRUCTURE = "SystemStructure.ssd"  # its name in an SSP
+SSD = "{http://ssp-standard.org/SSP1/SystemStructureDescription}"
 
 ENERGIES = {
     "energy.engine": "Work of the engine since the start; braking counts negative",
@@ -162,13 +165,20 @@ def write_system(output: Path, structure: Path, fmus: Mapping[str, Path]) -> Pat
     Raises
     ------
     InputError
-        If a file is missing, or the folder cannot be written to.
+        If a file is missing, an FMU lacks a variable that the structure names, or the folder cannot be written to.
     """
     try:
         content = {STRUCTURE: structure.read_bytes()}
         content |= {f"resources/{name}.fmu": path.read_bytes() for name, path in fmus.items()}
     except OSError as error:
         raise InputError(f"{error.filename}: cannot be read ({error.strerror}); build it first") from error
+    for component in ET.fromstring(content[STRUCTURE]).iter(f"{SSD}Component"):  # noqa: S314 - our own file
+        fmu = fmus[component.attrib["name"]]
+        known = {variable.name for variable in read_model_description(str(fmu)).modelVariables}
+        lacking = [one.attrib["name"] for one in component.iter(f"{SSD}Connector") if one.attrib["name"] not in known]
+        if lacking:
+            raise InputError(f"{fmu}: has no {', '.join(lacking)}, which {structure.name} has; take another FMU, or "
+                             "a structure for this one")  # fmt: skip
     with atomic_file(output) as partial:
         write_archive(partial, content)
     return output

@@ -11,6 +11,7 @@ import pytest
 
 from builder.native.native_fmu import build_native_fmu
 from builder.surrogate.train import TrainingResult
+from models.base.errors import InputError
 from tests.contract.native_hosts import run
 
 sys.path.append(str(Path(__file__).parents[2] / "examples"))
@@ -39,6 +40,12 @@ def test_the_example_closes_its_energy_balance_and_masters_agree(fzg_native: Pat
     difference = re.search(r"differ by ([0-9.e+-]+)", shown)
     if difference is not None:
         assert float(difference[1]) < 2e-10
+
+
+def test_an_fmu_without_a_variable_of_the_system_is_refused(fzg_native: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"fzg\S*.fmu: has no frame.T_in, which room.ssd has; take another FMU"):
+        write_system(tmp_path / "room.ssp", EXAMPLES / "room.ssd", {"gearbox": fzg_native})
+    assert not list(tmp_path.iterdir())
 
 
 def test_heat_goes_from_the_gearbox_into_the_room(fzg_training: TrainingResult, tmp_path: Path) -> None:
