@@ -229,8 +229,6 @@ def contact_points(
     >>> points = contact_points(pair, r_bore=(15e-3, 15e-3))
     >>> points.t.size, round(1e3 * float(points.dx.sum()), 3)
     (24, 19.092)
-    >>> round(load_sharing_loss_factor(pair, points), 4)
-    0.1915
     """
     if pair.epsilon_beta > 0.0 and model != "ohlendorf":
         return _points_on_lines(pair, _weight_of(pair, model, r_bore, E, nu))
@@ -321,6 +319,13 @@ def load_sharing_loss_factor(pair: GearPair, points: ContactPoints) -> float:
     .. [1] S. Wimmer, "Design of low-loss gears", dissertation, TU Muenchen, 2006. From memory; verified against
        Ohlendorf's closed form, and for helical gears against that of a uniform load and the sum over slices that
        GEARpie prints.
+
+    Examples
+    --------
+    >>> from models.formulas.geometry import gear_pair
+    >>> pair = gear_pair(z=(16, 24), m_n=4.5e-3, alpha_n=math.radians(20.0), b=14e-3, a=91.5e-3, x=(0.182, 0.172))
+    >>> round(load_sharing_loss_factor(pair, contact_points(pair, r_bore=(15e-3, 15e-3))), 4)
+    0.1915
     """
     sliding = pair.sliding_speed(points.t, 1.0) / pair.r_b[0]
     return float(np.sum(points.share * sliding * points.dx) / (pair.p_b * math.cos(pair.beta_b)))

@@ -151,7 +151,37 @@ class SkfBearing:
         return 2.0 * self.mass * GRAVITY
 
     def friction_moments(self, *, n_rpm: Numeric, F_r: Numeric, nu: Numeric) -> tuple[Array, Array, Array]:
-        """Rolling, sliding and drag moment.
+        r"""Rolling, sliding and drag moment.
+
+        .. math::
+            M_{rr} &= \phi_{ish}\,\phi_{rs}\,G_{rr}\,(\nu n)^{0.6},\quad
+            \phi_{ish} = \frac{1}{1 + 1.84 \cdot 10^{-9} (n d_m)^{1.28} \nu^{0.64}},\quad
+            \phi_{rs} = e^{-K_{rs} \nu n (d + D) \sqrt{K_Z / (2 (D - d))}}
+
+            M_{sl} &= G_{sl}\,[\phi_{bl}\,\mu_{bl} + (1 - \phi_{bl})\,\mu_{EHL}],\quad
+            \phi_{bl} = e^{-2.6 \cdot 10^{-8} (n \nu)^{1.4} d_m}
+
+            M_{drag} &= V\,n^2 + 1.093 \cdot 10^{-7} n^2 d_m^3 \left(\frac{n d_m^2 f_t}{\nu}\right)^{-1.379} R_s
+
+        with lengths in mm, n in 1/min and :math:`d_m = (d + D) / 2`. The variables of rolling and of sliding:
+
+        - cylindrical rollers: :math:`G_{rr} = R_1 d_m^{2.41} F_r^{0.31}`,
+          :math:`G_{sl} = S_2 F_r + S_1 d_m^{0.9} F_a`
+        - balls: :math:`G_{rr} = R_1 d_m^{1.96} F_r^{0.54}`, :math:`G_{sl} = S_1 d_m^{-0.26} F_r^{5/3}`; under an axial
+          load :math:`G_{rr} = R_1 d_m^{1.96} (F_r + 1.7 F_a / \sin\alpha_F)^{0.54}`,
+          :math:`G_{sl} = S_1 d_m^{-0.145} (F_r^5 + S_2 d_m^{1.5} F_a^4 / \sin\alpha_F)^{1/3}`, where
+          :math:`\alpha_F` is :math:`24.6 (F_a / C_0)^{0.24}` degrees
+        - tapers: :math:`G_{rr} = R_1 d_m^{2.38} (F_r + 10.9 Y F_a)^{0.31}`,
+          :math:`G_{sl} = S_1 d_m^{0.82} (F_r + 2 Y F_a)`
+
+        Drag, with :math:`K = K_Z (d + D) / (D - d) \cdot 10^{-12}`, the immersion
+        :math:`t = 2 \arccos(1 - H / (0.6 d_m))` and :math:`V_M(H / d_m)` from SKF's diagram:
+
+        - balls: :math:`V = 0.4 V_M K d_m^5`; rollers: :math:`V = 4 V_M K_L K C_w B d_m^4` with
+          :math:`l_D = 5 K_L B / d_m`, :math:`C_w = 2.789 \cdot 10^{-10} l_D^3 - 2.786 \cdot 10^{-4} l_D^2
+          + 0.0195 l_D + 0.6439`
+        - :math:`R_s = 0.36 d_m^2 (t - \sin t) \cdot 0.05 K_Z (D + d) / (D - d)`, and :math:`f_t = \sin(t / 2)`, 1 above
+          half a turn
 
         Parameters
         ----------
