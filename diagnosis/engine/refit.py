@@ -41,7 +41,8 @@ def refit(
         If there is no solution at any of the starts.
     """
     held = held_numbers(fit.experiment, [candidate], len(fit.z))
-    if candidate.term is not None and switch_numbers(candidate.term):
+    switches = candidate.term is not None and bool(switch_numbers(candidate.term))
+    if switches:
         candidate, strength = refined(fit, candidate, [variant, *(other for other, _ in further)])
         variant, further = 0, ()
     line = cache(lambda one: _straight_line(fit, candidate, one))
@@ -60,12 +61,12 @@ def refit(
             return []
 
     rough: list[Fit] = []
-    for base in bases if held else bases[:1]:
-        for share in SWITCH_SHARES if held else START_SHARES:
+    for base in bases if switches else bases[:1]:
+        for share in SWITCH_SHARES if switches else START_SHARES:
             found = rough_fit(variant, share * strength, base)
             rough += found
             better = any(one.objective < fit.objective for one in found)
-            if found and better != bool(held):
+            if found and better != switches:
                 break
     for other, size in further:
         rough += rough_fit(other, size)

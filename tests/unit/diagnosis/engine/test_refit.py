@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -152,19 +153,25 @@ def test_the_heat_of_a_term_over_the_time(experiment: Experiment, scale: Scale) 
     assert heat == pytest.approx(bell * np.sqrt(piece.steps), rel=1e-6, abs=1e-6)
 
 
+def starts_of_fits(monkeypatch: pytest.MonkeyPatch, index: int) -> list[float]:
+    """Strengths, which are one unknown, from which rough fits start from now on."""
+    starts, fit = list[float](), Experiment.fit
+
+    def noted(own: Experiment, z: Array, *given: Any, iterations: int, **options: Any) -> Fit:
+        if iterations == ROUGH:
+            starts.append(own.unknowns[index].value(float(z[index])))
+        return fit(own, z, *given, iterations=iterations, **options)
+
+    monkeypatch.setattr(Experiment, "fit", noted)
+    return starts
+
+
 def test_what_switches_starts_from_several_strengths(
     experiment: Experiment, scale: Scale, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     placed, _, base = with_fan(experiment, scale)
     without = calibrate(experiment)
-    starts, fit = list[float](), Experiment.fit
-
-    def noted(own: Experiment, z: Array, *given: Any, iterations: int, **options: Any) -> Fit:
-        if iterations == ROUGH:
-            starts.append(own.unknowns[len(base.z)].value(float(z[len(base.z)])))
-        return fit(own, z, *given, iterations=iterations, **options)
-
-    monkeypatch.setattr(Experiment, "fit", noted)
+    starts = starts_of_fits(monkeypatch, len(base.z))
     found_with(base, placed)
     assert np.array(starts[:3]) / starts[0] == pytest.approx(SWITCH_SHARES) and len(starts) >= 3
     starts.clear()
@@ -181,3 +188,20 @@ def test_what_switches_starts_from_several_strengths(
     assert len(grids) == 1  # and a finer grid neither
     found_with(base, placed)
     assert len(grids) == 1 + switch_grid.LEVELS
+
+
+def test_in_means_over_minutes_too_and_from_the_fit_as_it_is(
+    experiment: Experiment, scale: Scale, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """There its numbers are not held, but the objective has many minima all the same."""
+    slow = replace(experiment, pieces=tuple(replace(piece, slow=True) for piece in experiment.pieces))
+    placed, _, base = with_fan(slow, scale)
+    aside = replace(base, z=base.z + 0.3)
+    far = replace(aside, linearised=aside.experiment.linearise(aside.z))
+    starts = starts_of_fits(monkeypatch, len(base.z))
+    found_with(base, placed)
+    once = len(starts)
+    assert np.array(starts[:3]) / starts[0] == pytest.approx(SWITCH_SHARES) and once >= 3
+    starts.clear()
+    found_with(far, placed)
+    assert len(starts) == 2 * once
