@@ -262,7 +262,7 @@ def test_two_that_begin_at_the_same_time_are_no_claims(apart_s: float, grade: st
     pair = [effect(name, ending="step", clock="start", date=f"{name}_since") for name in ("first", "second")]
     unknowns = [SimpleNamespace(parameter=SimpleNamespace(name=name), value=float)
                 for name in ("first_since", "other", "second_since")]  # fmt: skip
-    pieces = [SimpleNamespace(recording=name, steps=np.full(100, 1000.0)) for name in ("tested", "healthy")]
+    pieces = [SimpleNamespace(recording=name, duration=100_000.0) for name in ("tested", "healthy")]
     experiment = SimpleNamespace(unknowns=unknowns, pieces=pieces, tested=[0])
     fit = cast(Fit, SimpleNamespace(experiment=experiment, z=np.array([1000.0, 3.0, 1000.0 + apart_s])))
     both = replace(judged(2.0 * STRONG, *pair), fit=fit, left=0.0)

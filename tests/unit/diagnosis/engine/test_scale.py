@@ -33,7 +33,7 @@ def test_estimates_keep_the_stated_size_unless_a_loss_is_measured(channels: tupl
     direction = scale_direction(network, unknowns)
     ratios = np.linspace(-1.0, 1.0, len(unknowns))
     ratios -= direction * (ratios @ direction) / (direction @ direction)
-    experiment = SimpleNamespace(machine=SimpleNamespace(model=SimpleNamespace(network=network)), unknowns=unknowns,
+    experiment = SimpleNamespace(network=network, unknowns=unknowns,
                                  pieces=[SimpleNamespace(channels=channels)])  # fmt: skip
     small = ratios + direction * np.log(1.0 / 3.0)
     assert [one.value(z) for one, z in zip(unknowns, small - ratios, strict=True)][:2] == pytest.approx([1.0 / 3.0] * 2)
