@@ -262,5 +262,5 @@ def _lagged_drive(view: View) -> Array:
 
 CONSTANT = Single(label="constant", values=lambda view: np.ones(len(view.piece.steps)))
 LAGGED_DRIVE = Single(label="before", values=_lagged_drive)
-HOURS = Single(label="hours", values=lambda view: view.piece.middle / view.standard.hours_s)
+SINCE_START = Single(label="hours", values=lambda view: view.piece.middle / view.standard.hours_s)
 AFTER_START = Single(label="after start", values=lambda view: np.exp(-view.piece.middle / START_S))

@@ -17,8 +17,8 @@ from diagnosis.engine.model_error.anatomy import AMBIENT, Anatomy, Family
 from diagnosis.engine.model_error.courses import (
     AFTER_START,
     CONSTANT,
-    HOURS,
     LAGGED_DRIVE,
+    SINCE_START,
     SPEED,
     TEMPERATURE,
     TORQUE,
@@ -232,7 +232,7 @@ def memories(machine: Anatomy) -> Iterator[Change]:
 
 def ageing(machine: Anatomy) -> Iterator[Change]:
     """Losses and links by the hours, losses by the time after the start."""
-    yield from _everything(machine, HOURS)
+    yield from _everything(machine, SINCE_START)
     yield from (_of_sources(source.name, (source.name,), AFTER_START) for source in machine.network.sources)
 
 
