@@ -92,7 +92,7 @@ def prove(
         load_gearbox(gearbox or "fzg")
         file = answers or output / "given.jsonl"
         begin_lines(file, ProofSettings(plant="given", gearbox=gearbox or "fzg", cells_every=cells_every,
-                                   baselines=baselines))  # fmt: skip
+                                        baselines=baselines))  # fmt: skip
     else:
         settings = _settings_of_made(plant, cases, seed, gearbox=gearbox, families=families, cells_every=cells_every,
                                      baselines=baselines, removed=removed)  # fmt: skip
@@ -154,7 +154,7 @@ def _settings_of_made(
     mix, chosen, machine = (PROOF_MIX, OWN_PROOF, "fzg") if plant == "own" else (ZOO_COUNTS, ZOO_PROOF[0], "")
     number = sum(mix_of(cases or sum(mix.values()), mix).values())  # refuses too few
     return ProofSettings(plant=plant, seed=chosen if seed is None else seed, cases=number, gearbox=gearbox or machine,
-                    families=families, cells_every=cells_every, baselines=baselines, removed=removed)  # fmt: skip
+                         families=families, cells_every=cells_every, baselines=baselines, removed=removed)  # fmt: skip
 
 
 def _prove_real(name: str, output: Path) -> None:

@@ -95,7 +95,6 @@ def _key(gearbox: Gearbox, preset: Preset, seed: int) -> str:
     """Hash of all that decides the weights, to their last bit."""
     made_of = {
         "losses": hashlib.sha256(pickle.dumps(gearbox.losses(), protocol=5)).hexdigest(),
-        "viscosity": gearbox.viscosity_constants,
         "range": gearbox.training,
         "preset": asdict(preset),
         "seed": seed,

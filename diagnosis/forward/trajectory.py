@@ -375,7 +375,15 @@ class Heat:
 
 
 def parameter_heat(model: NetworkOnGrid, trajectory: Trajectory, index: int, step: float) -> Heat:
-    """Heat per unit of a parameter along a trajectory, by a difference of so many units."""
+    """Heat per unit of a parameter along a trajectory, by a difference.
+
+    Parameters
+    ----------
+    index : int
+        Which parameter
+    step : float
+        In its unit
+    """
     values = trajectory.values.copy()
     values[index] += step
     power = losses_along(model, trajectory)

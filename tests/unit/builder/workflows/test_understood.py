@@ -33,3 +33,9 @@ def test_every_stage_and_bearing_has_its_row() -> None:
     assert [table.title.split(";")[0] for table in two[-2:]] == ["Gears of stage 1", "Gears of stage 2"]
     loads = {row[0]: row[1:] for row in two[-3].rows}
     assert len(loads) == 6 and loads["middle_far_side"][0] == "508.2"
+
+
+def test_tables_say_at_which_inputs_they_are(fzg: Gearbox) -> None:
+    titles = [table.title for table in understood(fzg)]
+    assert any(title.endswith("\n(speed 3250 1/min, torque 175 N m, air_speed 2 m/s)") for title in titles)
+    assert "Where temperatures settle, in degC, at T_ambient 27 degC, air_speed 2 m/s" in titles
