@@ -16,6 +16,7 @@ from builder.fmi.signals import input_name
 from diagnosis.recordings.machine import DescribedMachine, Part
 from models.base.errors import InputError
 from models.correction.correction import Correction
+from models.files.toml_file import ENDING
 from models.quantities.quantities import GEARBOX_INPUTS, INPUT_KINDS, Input, named_input
 from models.quantities.units import UNITS, conversion, find_unit
 
@@ -133,6 +134,8 @@ def description_of(path: Path) -> Any:
             raise InputError(f"{path}: no such file")
     except OSError as error:  # a name that is too long, a folder that may not be read
         raise InputError(f"{path}: cannot be read ({error.strerror})") from error
+    if path.suffix == ENDING:
+        raise InputError(f"{path}: is not an FMU; a definition is given as --gearbox {path}")
     with damage_reported(path), path.open("rb") as file:  # which fmpy would leave open where it fails
         description = fmpy.read_model_description(file, validate=False)
     if not description.fmiVersion.startswith(("2.", "3.")) or description.coSimulation is None:

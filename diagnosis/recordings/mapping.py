@@ -249,7 +249,7 @@ class RecordingMapping(Section):
     def text_form(self) -> TextForm:
         """Form of its CSV files."""
         texts = self.time.columns if self.time is not None and "%" in (self.time.unit or "") else ()
-        return TextForm(**dict(self.csv), missing=self.missing, texts=texts, by_mapping=True)
+        return TextForm(**dict(self.csv), missing=self.missing, texts=texts, units_below=True)
 
 
 def looks_like_kelvin(quantity: Quantity, lowest: float, highest: float) -> bool:

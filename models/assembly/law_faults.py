@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import sympy as sp
+from numpy.typing import NDArray
 
 from models.base.errors import InputError, did_you_mean
 from models.definition.machine_definition import MachineDefinition
@@ -36,27 +37,33 @@ def law_faults(definition: MachineDefinition) -> list[tuple[str, str]]:
             (path, f"{name!r} is no input and no temperature of this definition{did_you_mean(name, known)}")
             for name in unknown
         ]
-        if path.startswith("link.") and not unknown:
-            faults += [(path, fault) for fault in _negative(law, definition)]
+        if not unknown:
+            faults += [(path, fault) for fault in _unusable(law, definition, heat=path.startswith("heat."))]
     return faults
 
 
-def _negative(factor: sp.Expr, definition: MachineDefinition) -> Iterator[str]:
-    """A fault if a factor on a conductance is below 0 at low, middle or high values of what is in it."""
+def _unusable(law: sp.Expr, definition: MachineDefinition, *, heat: bool) -> Iterator[str]:
+    """A fault if a law is infinite, or a factor below 0, at low, middle or high values of what is in it."""
     speed, torque, temperature = definition.full_operation
     ranges = {"time": (0.0, 1e5), "speed": (0.0, speed), "torque": (0.0, torque)}
     ranges |= {p.name: (p.start, p.start) for p in definition.parameter}
     for name, given in definition.inputs.items():
         if name not in ranges and not given.quantity.is_temperature:
             ranges[name] = given.quantity.low, given.quantity.high
-    names = sorted(s.name for s in factor.free_symbols)
+    names = sorted(s.name for s in law.free_symbols)
     warm = COLD_DEGC, temperature
     levels = [np.linspace(*ranges.get(name, warm), 3) for name in names]
     points = [grid.ravel() for grid in np.meshgrid(*(level[np.isfinite(level)] for level in levels))]
-    with np.errstate(all="ignore"):  # what is no real number there is no fault of its sign
-        (values,) = compile_each(names, [factor])(*points)
+    with np.errstate(all="ignore"):  # what is no real number there may be one where the machine runs
+        (values,) = compile_each(names, [law])(*points)
     values = np.broadcast_to(np.asarray(values, dtype=float), points[0].shape if points else (1,))
-    if (below := np.flatnonzero(values < 0.0)).size:
-        where = ", ".join(f"{name} = {point[below[0]]:g}" for name, point in zip(names, points, strict=True))
-        at = f" at {where}" if where else ""
-        yield f"is {values[below[0]]:.3g}{at}; a conductance is never negative: keep it above 0, with Max(0, ...)"
+
+    def first(bad: NDArray[np.bool_]) -> str:
+        index = int(np.flatnonzero(bad)[0])
+        where = ", ".join(f"{name} = {point[index]:g}" for name, point in zip(names, points, strict=True))
+        return f"is {values[index]:.3g}" + (f" at {where}" if where else "")
+
+    if (below := values < 0.0).any() and not heat:
+        yield f"{first(below)}; a conductance is never negative: keep it above 0, with Max(0, ...)"
+    elif (infinite := np.isinf(values)).any():
+        yield f"{first(infinite)}; keep what it divides by away from 0: Max(0.1, ...), or another range"

@@ -13,7 +13,8 @@ from models.files.toml_file import packaged, parse, read_text
 FOLDER, FILE = "bearings", "known"
 # Suffixes of cage and design do not count; the friction of a seal in the bearing (RS) is not modelled.
 # Under a radial load N, NJ and NUP have the constants of NU.
-DESIGNATION = re.compile(r"\s*(N|NJ|NU|NUP)?\s*(\d{3,5})(?!\d)(?!.*RS)")
+DESIGNATION = re.compile(r"\s*(N|NJ|NU|NUP)?\s*(\d{3,5})(?!\d)")
+SEALED = "RS"  # in a suffix: seals that rub
 SIZES = ("bore_mm", "outside_diameter_mm", "width_mm", "mass_kg")
 FIFTH = {"deep_groove_ball": ("static_load_kN",), "tapered_roller": ("Y",)}  # what the table has next to the sizes
 FILLED = (*SIZES, "static_load_kN", "Y", "R1", "S1", "S2", "type", "model")  # what a designation gives
@@ -82,7 +83,8 @@ def filled_by_designation(own: dict[str, Any], notes: Annotations, path: str) ->
     named = own.get("designation")
     match = DESIGNATION.match(named) if isinstance(named, str) else None
     name = f"{'NU ' if match[1] else ''}{match[2]}" if match else ""
-    if name in _catalogue():
+    sealed = isinstance(named, str) and SEALED in named
+    if name in _catalogue() and not sealed:
         values, series, of_mass = _catalogue()[name]
         filled = {key: value for key, value in values.items() if key not in own}
         for key in filled:
@@ -98,7 +100,13 @@ def filled_by_designation(own: dict[str, Any], notes: Annotations, path: str) ->
     missing = [key for key in (*SIZES, "R1", "type") if key not in own]
     if not {*SLIDING_OF_TYPE.values()} & {*own}:
         missing.append(SLIDING_OF_TYPE.get(str(own.get("type")), "S1 (balls, tapers) or S2 (rollers)"))
-    if missing and isinstance(named, str):
+    if missing and sealed and name in _catalogue():
+        text = (
+            f"{named!r} has seals that rub, and open bearings are known; give {', '.join(missing)}, or {name!r} if the "
+            "friction of its seals does not matter"
+        )
+        notes.faults.append((f"{path}.designation", text))
+    elif missing and isinstance(named, str):
         text = (
             f"sizes of {named!r} are not known; give {', '.join(missing)} (known are cylindrical roller bearings as "
             "NU 207, taper roller bearings as 30208 and deep groove ball bearings as 6208, open: "

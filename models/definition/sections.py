@@ -159,7 +159,8 @@ class Fluid(Section):
     def _pressure_viscosity_has_its_table(self) -> Self:
         needed = "modulus" if self.pressure_viscosity == "modulus" else "gold"
         if getattr(self, needed) is None:
-            raise ValueError(f"pressure_viscosity = '{self.pressure_viscosity}' needs the table '{needed}'")
+            keys = ", ".join((Modulus if needed == "modulus" else Gold).model_fields)
+            raise ValueError(f"pressure_viscosity = '{self.pressure_viscosity}' needs [oil.{needed}] with {keys}")
         return self
 
     @model_validator(mode="after")

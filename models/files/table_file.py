@@ -62,8 +62,8 @@ class TextForm:
         Of its text, by a name that Python knows
     skip_lines : tuple of int
         Lines that are no table, counted from 1, such as names of units below the header
-    by_mapping : bool
-        True if a mapping file can state all this, which messages then advise
+    units_below : bool
+        True if a row of units may follow the header
     """
 
     separator: str = ","
@@ -73,7 +73,7 @@ class TextForm:
     texts: tuple[str, ...] = ()
     encoding: str = UTF_8
     skip_lines: tuple[int, ...] = ()
-    by_mapping: bool = False
+    units_below: bool = False
 
 
 PLAIN = TextForm()
@@ -197,8 +197,6 @@ def copies_of(name: str, names: Iterable[str]) -> list[str]:
 
 # ---------------------------------------------------------------------- text
 
-_STATED = "or state in a mapping file (--mapping) how it is written"
-
 
 @contextmanager
 def _open_text(path: Path, form: TextForm) -> Iterator[io.TextIOWrapper]:
@@ -233,26 +231,23 @@ def _lines(path: Path, text: Iterable[str], form: TextForm) -> Iterator[str]:
         if "\0" in line:
             advice = "it is no text, or damaged"
             if number == 1 and set(line[1:10:2]) == {"\0"}:
-                advice = f"it looks like UTF-16 without a mark: {_to_decode('utf-16-le', form)}"
+                advice = f"it looks like UTF-16 without a mark: {_to_decode('utf-16-le')}"
             raise InputError(f"{path}: a NUL byte in line {number}; {advice}")
         try:
             line.encode()
         except UnicodeEncodeError as error:
             byte, encoding = ord(line[error.start]) - 0xDC00, form.encoding.removesuffix("-sig").upper()
             raise InputError(
-                f"{path}: byte 0x{byte:02x} in line {number} is not {encoding}; {_to_decode('cp1252', form)}"
+                f"{path}: byte 0x{byte:02x} in line {number} is not {encoding}; {_to_decode('cp1252')}"
             ) from error
         is_stated = number == 1 and _EXCEL_SEPARATOR.fullmatch(line)
         # A '#' within a row is a cell such as '#REF!', so that pandas' own option for remarks cannot be used.
         yield "\n" if is_stated or line.startswith("#") or number in form.skip_lines else line
 
 
-def _to_decode(encoding: str, form: TextForm) -> str:
+def _to_decode(encoding: str) -> str:
     """Return what to do with a text of another encoding."""
-    plain = "save the file as UTF-8"
-    if not form.by_mapping:
-        return f"{plain}, {_STATED}"
-    return f'give csv = {{ encoding = "{encoding}" }} in a mapping file, or {plain}'
+    return f'give csv = {{ encoding = "{encoding}" }} in a mapping file (--mapping), or save the file as UTF-8'
 
 
 def _first_lines(lines: Iterator[str], count: int) -> dict[int, str]:
@@ -313,7 +308,7 @@ def _read_head(path: Path, lines: Iterator[str], form: TextForm) -> _Head:
     """Read the first lines.
 
     Refused are another separator, no header, lines above it, and rows of texts or too many fields below it. A row of
-    units below it (where a mapping file could be there), and separators at the ends of the rows, are taken as such.
+    units below it (where the form has one), and separators at the ends of the rows, are taken as such.
     """
     head = _first_lines(lines, HEAD_LINES)
     rows = [(number, _fields(line, form.separator)) for number, line in head.items() if line.strip()]
@@ -332,7 +327,7 @@ def _read_head(path: Path, lines: Iterator[str], form: TextForm) -> _Head:
         raise InputError(f"{path}: its first line holds numbers; a header line with column names is needed")
     below, units = rows[1:], list[str]()
     texts_below = list(takewhile(lambda row: _holds_texts(row[1]) or _are_units(row[1]), below))
-    if form.by_mapping and texts_below and _are_units(texts_below[0][1]):
+    if form.units_below and texts_below and _are_units(texts_below[0][1]):
         number, cells = texts_below.pop(0)
         units = [cell.strip("[]()") for cell in cells]
         head[number] = "\n"
@@ -358,7 +353,7 @@ def _check_separator(path: Path, lines: Sequence[str], form: TextForm) -> None:
         likely += [other for other in others if other in lines[0]]
     if likely:
         decimal = "," if any(re.search(r"\d,\d", line) for line in lines) else "."
-        advice = _advice(likely[0], decimal, form)
+        advice = _advice(likely[0], decimal)
         raise InputError(f"{path}: its columns are separated by {SEPARATORS[likely[0]]}; {advice}")
     if len(_fields(lines[0], form.separator)) > 1:
         return
@@ -411,8 +406,7 @@ def _shown(cells: Sequence[str]) -> str:
 def _to_skip(numbers: Sequence[int], form: TextForm) -> str:
     """Return what to do with lines that are no table."""
     skipped, it = sorted({*form.skip_lines, *numbers}), "it" if len(numbers) == 1 else "them"
-    by_mapping = f"give csv = {{ skip_lines = {skipped} }} in a mapping file, " if form.by_mapping else ""
-    return f"remove {it}, {by_mapping}or begin {it} with '#'"
+    return f"remove {it}, give csv = {{ skip_lines = {skipped} }} in a mapping file (--mapping), or begin {it} with '#'"
 
 
 def _too_many_fields(line: int, count: int, names: int, form: TextForm) -> str:
@@ -425,15 +419,15 @@ def _too_many_fields(line: int, count: int, names: int, form: TextForm) -> str:
     )
 
 
-def _advice(separator: str, decimal: str, form: TextForm) -> str:
+def _advice(separator: str, decimal: str) -> str:
     """Return what to do with a file of another separator."""
-    plain = "write it with ',' and decimal points"
-    if not form.by_mapping:
-        return f"{plain}, {_STATED}"
     if separator == ",":
         return 'the mapping file in use states others: give csv = { separator = "," } there, or name another --mapping'
     shown = "\\t" if separator == "\t" else separator
-    return f'give csv = {{ separator = "{shown}", decimal = "{decimal}" }} in a mapping file, or {plain}'
+    return (
+        f'give csv = {{ separator = "{shown}", decimal = "{decimal}" }} in a mapping file (--mapping), or write it '
+        "with ',' and decimal points"
+    )
 
 
 # ---------------------------------------------------------------------- Parquet

@@ -209,6 +209,9 @@ def test_file_must_be_an_fmu(fzg_fmu: Path, tmp_path: Path) -> None:
         drive_fmu(tmp_path / "absent.fmu", cycle())
     with pytest.raises(InputError, match="is not a file but a folder; name an FMU, as .*fzg.fmu"):
         drive_fmu(fzg_fmu.parent, cycle())
+    (tmp_path / "fzg.toml").touch()
+    with pytest.raises(InputError, match=r"is not an FMU; a definition is given as --gearbox .*fzg\.toml"):
+        drive_fmu(tmp_path / "fzg.toml", cycle())
     (tmp_path / "text.fmu").write_text("not a zip")
     with pytest.raises(InputError, match="is not an FMU, or is damaged"):
         drive_fmu(tmp_path / "text.fmu", cycle())

@@ -74,11 +74,16 @@ def test_what_a_designation_is_taken_for(written: str, known: str) -> None:
     assert filled(known)["bore_mm"] == 5.0 * int(known[-2:])
 
 
-@pytest.mark.parametrize("name", ["6208-2RS1", "QJ 208", "208", "62208", "NUP 2299"])
-def test_a_seal_and_other_types_are_not_known(name: str) -> None:
+@pytest.mark.parametrize(("name", "fault"), [
+    ("6208-2RS1", "'6208-2RS1' has seals that rub, and open bearings are known; give bore_mm, outside_diameter_mm"),
+    *((name, f"sizes of '{name}' are not known") for name in ("QJ 208", "208", "62208", "NUP 2299", "62299-RS")),
+])  # fmt: skip
+def test_a_seal_and_other_types_are_not_known(name: str, fault: str) -> None:
     notes = Annotations()
     assert filled_by_designation({"designation": name}, notes, "bearing.0") == {"designation": name}
-    assert [path for path, _ in notes.faults] == ["bearing.0.designation"]
+    ((path, said),) = notes.faults
+    assert path == "bearing.0.designation"
+    assert said.startswith(fault)
 
 
 def test_another_type_brings_its_constants() -> None:

@@ -157,7 +157,10 @@ def test_measured_viscosities_replace_the_line_of_a_named_oil() -> None:
 
 
 def test_a_law_without_its_constants_is_refused() -> None:
-    with pytest.raises(InputError, match=re.escape("oil: pressure_viscosity = 'modulus' needs the table 'modulus'")):
+    with pytest.raises(
+        InputError,
+        match=re.escape("oil: pressure_viscosity = 'modulus' needs [oil.modulus] with a1_Pa, a2_Pa_per_K, b1"),
+    ):
         read_gearbox(with_oil('named = "ESTR"\npressure_viscosity = "modulus"'), file="x.toml")
 
 
