@@ -22,7 +22,7 @@ from builder.native.native_fmu import build_native_fmu
 from builder.python.python_fmu import build_python_fmu
 from builder.surrogate.kept import kept_or_trained
 from builder.surrogate.onnx_export import export_onnx
-from builder.surrogate.train import TrainingResult
+from builder.surrogate.train import ErrorReport, TrainingResult
 from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.atomic_write import atomic_folder
 from models.base.errors import InputError
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 SUFFIX = {"python": "", "native": "_native", "native_fmi3": "_native_fmi3"}  # of the files' names
 LABEL = {"python": "python", "native": "native", "native_fmi3": "native FMI 3.0"}  # of the kinds, for people
 POOR_LOSS = 0.02  # of the total loss, mean over the reference cycle
+ROUGH = 0.05  # relative error of one loss at one of twenty points
 VERSIONS = {"2": ("native",), "3": ("native_fmi3",), "both": ("native", "native_fmi3")}  # native kinds by --fmi
 
 
@@ -261,6 +262,7 @@ def build(
                     gearbox, preset=preset, samples=samples, seed=seed, jobs=jobs, dask=dask, retrain=retrain,
                     progress=progress,
                 )  # fmt: skip
+            notes += _rough(training.report)
             progress("exporting the networks")
             with _measure_time("export", seconds):
                 networks = export_onnx(training, stage / "networks", version=project_version())
@@ -307,6 +309,15 @@ def build(
         made = sorted(path.relative_to(stage) for path in stage.rglob("*") if path.is_file())
     files = tuple(folder / path for path in made)
     return replace(report, files=files, notes=(*report.notes, *_left_from_before(folder, files)))
+
+
+def _rough(report: Sequence[ErrorReport]) -> list[str]:
+    """A note if a network is far from its loss somewhere."""
+    worst = max(report, key=lambda one: one.percentile_95)
+    if worst.percentile_95 < ROUGH:
+        return []
+    advice = "good for a trial; train on more points (--samples) before you use its losses"
+    return [f"{worst.component} is {worst.percentile_95:.0%} off and more at one of twenty points: {advice}"]
 
 
 def _poor(fmu: str, errors: CycleErrors) -> list[str]:

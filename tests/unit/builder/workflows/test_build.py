@@ -39,6 +39,13 @@ def test_errors_over_a_cycle_are_those_of_the_fmu_against_the_model() -> None:
     assert note.startswith("own.fmu: the total loss is 9.3% off the full model on average; train larger networks")
 
 
+def test_the_worst_network_of_a_trial_is_named(fzg_training: TrainingResult) -> None:
+    fine = [replace(one, percentile_95=0.01) for one in fzg_training.report]
+    assert builder_build._rough(fine) == []
+    (note,) = builder_build._rough([fine[0], replace(fine[1], percentile_95=0.16), *fine[2:]])
+    assert note.startswith(f"{fine[1].component} is 16% off and more at one of twenty points: good for a trial")
+
+
 def test_an_fmu_that_cannot_run_here_is_built_and_that_is_told(
     fzg: Gearbox, fzg_training: TrainingResult, fzg_fmu: Path, fzg_native: Path, tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
