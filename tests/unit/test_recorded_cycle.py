@@ -126,12 +126,17 @@ def test_a_plain_cycle_of_a_gearbox_whose_definition_maps_columns(tmp_path: Path
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ("time_s;speed_rpm;torque_Nm\n0;1;2\n", "run.csv: its columns are separated by ';'; write it with ','"),
+        (
+            "time_s;speed_rpm;torque_Nm\n0;1;2\n",
+            "run.csv: its columns are separated by ';'; "
+            'give csv = { separator = ";", decimal = "." } in a mapping file '
+            "(--mapping), or write it with ','",
+        ),
         ("time_s,speed_rpm\n0,1\n", "run.csv: column torque_Nm is missing; it has: speed_rpm, time_s"),
         ("", "run.csv: is empty"),
     ],
 )
-def test_faults_of_a_cycle_without_a_mapping_are_told_as_ever(
+def test_faults_of_a_cycle_without_a_mapping_are_told(
     tmp_path: Path, network: ThermalNetwork, content: str, message: str
 ) -> None:
     path = tmp_path / "run.csv"
