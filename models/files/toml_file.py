@@ -35,8 +35,8 @@ def read_text(source: Path | Traversable) -> str:
     try:
         return source.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
-        advice = "; an FMU is given without an option" if source.name.endswith(".fmu") else "; TOML must be"
-        raise InputError(f"{source}: is not UTF-8 text (byte {error.start}){advice}") from error
+        of_fmu = "; only simulate takes an FMU, before the cycle" if source.name.endswith(".fmu") else ""
+        raise InputError(f"{source}: is not UTF-8 text (byte {error.start}); TOML must be{of_fmu}") from error
     except (OSError, ValueError) as error:
         raise InputError(f"{source}: cannot be read ({getattr(error, 'strerror', None) or error})") from error
 

@@ -103,9 +103,9 @@ def test_unknown_names_and_files(name: str, message: str) -> None:
 def test_a_file_that_is_not_text(tmp_path: Path) -> None:
     path = tmp_path / "binary.toml"
     path.write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(InputError, match=r"is not UTF-8 text \(byte 0\); TOML must be"):
+    with pytest.raises(InputError, match=r"is not UTF-8 text \(byte 0\); TOML must be$"):
         load_gearbox(path)
-    with pytest.raises(InputError, match=r"\(byte 0\); an FMU is given without an option"):
+    with pytest.raises(InputError, match="; TOML must be; only simulate takes an FMU, before the cycle$"):
         load_gearbox(path.rename(tmp_path / "rig.fmu"))
     with pytest.raises(InputError, match="cannot be read"):
         load_gearbox(tmp_path)
