@@ -163,7 +163,10 @@ def _links(gearbox: Gearbox, network: ThermalNetwork) -> Grid:
     read = {one.name for link in network.links for one in link.conductance.free_symbols}
     mid = _signals(gearbox, network, dict(SHARES)["mid"])
     at = _with_units({name: mid[name] for name in network.inputs if name in read}, network.inputs)
+    outside = {node.name for node in network.nodes if node.temperature is not None}
+    to_outside = sum(found[link.name] for link in network.links if len(outside.intersection(link.nodes)) == 1)
     title = f"{len(network.links)} links; conductances in W/K at mid operation, parts at {warm:g} degC"
+    title += f"; {_number(to_outside)} to the surroundings in all"
     title += f"\n({at})" if at else ""
     return Grid(title, ["between", "depends on", "W/K"], rows, 2)
 

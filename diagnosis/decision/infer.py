@@ -85,7 +85,7 @@ def infer(
     starts: list[tuple[Scanned, StartOf]] = [(first, lambda one: calibration.in_class(one).fit)]
     if calibration.is_far:
         progress("scanning from the middles of the priors too")
-        with suppress(ArithmeticError):
+        with suppress(*NO_SOLUTION):
             middles = scan(calibration.at_middles(chosen.error_class), candidates, calibration.near.columns)
             starts.append((scan_in_classes(calibration, middles), calibration.at_middles))
     judged = _raced(calibration, starts, progress)

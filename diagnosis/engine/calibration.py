@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from models.base.types import Array
 
 TURNS = 3  # with the chosen class: point, columns of model error and deviation between sessions settle together
 LONGEST = 16.0  # times as long as assumed, random heats may last where only the form of the laws is known
+PART_STEPS = (0.25, 0.5, 2.0, 4.0)  # in the random heat of one part
 WORTH = 1.0  # nats that another random heat has to bring
 FAR_SD = 4.0  # of a prior, from which a calibration without the effect may be far from the machine with it
 
@@ -131,23 +132,35 @@ class NearReadings:
     def most_probable(self, log_evidence: Callable[[RandomHeat], float], start: RandomHeat) -> RandomHeat:
         """Random heats with the most evidence, searched for from a start; without draughts there, without.
 
-        They are halved, and made to last twice as long where no more than the form of the laws is known, by the step
-        that brings most evidence as long as one does. They are never more than assumed, and with geometry they do not
-        last longer: an effect of hours would pass for random.
+        All are halved by the step that brings most evidence as long as one does. They are never more than assumed.
+        Where no more than the form of the laws is known they may last longer, and each part has as much as its
+        readings show (Kristensen, Madsen, Jorgensen 2004). With geometry an effect of hours would pass for random.
         """
-        longest, (most, _) = LONGEST if self.experiment.noise[0].goes_with_capacity else 1.0, rule().draughts
-        best = start
-        while True:
-            tried = [replace(best, **{name: times * getattr(best, name)})
+        noise, (most, _) = self.experiment.noise[0], rule().draughts
+        longest = LONGEST if noise.goes_with_capacity else 1.0
+
+        def of_all(now: RandomHeat) -> list[RandomHeat]:
+            tried = [replace(now, **{name: times * getattr(now, name)})
                      for name in ("heat", "wander", "time", "draught") for times in (0.5, 2.0)]  # fmt: skip
             # Less heat that lasts longer does nearly the same: both change at once, or neither would alone.
-            tried += [replace(best, heat=times * best.heat, time=best.time / times) for times in (0.5, 2.0)]
-            able = [one for one in tried
-                    if max(one.heat, one.wander, one.draught / most) <= 1.0 <= one.time <= longest]  # fmt: skip
-            other = max(able, key=log_evidence)
-            if log_evidence(other) < log_evidence(best) + WORTH:
-                return best
-            best = other
+            tried += [replace(now, heat=times * now.heat, time=now.time / times) for times in (0.5, 2.0)]
+            return [one for one in tried if max(one.heat, one.wander, one.draught / most) <= 1.0 <= one.time <= longest]
+
+        def of_part(part: int, now: RandomHeat) -> list[RandomHeat]:
+            has = now.parts or (1.0,) * len(noise.heat_sd)
+            return [replace(now, parts=(*has[:part], times * has[part], *has[part + 1 :]))
+                    for times in PART_STEPS if times * has[part] <= 1.0]  # fmt: skip
+
+        steps: list[Callable[[RandomHeat], list[RandomHeat]]] = [of_all]
+        if noise.goes_with_capacity:
+            steps += [partial(of_part, part) for part in range(len(noise.heat_sd))]
+        best, before = start, None
+        while best != before:
+            before = best
+            for step in steps:
+                while log_evidence(other := max(step(best), key=log_evidence)) >= log_evidence(best) + WORTH:
+                    best = other
+        return best
 
     def fitted(
         self, one: ErrorClass, start: Fit, deviation: float = 0.0, *, iterations: int = FIRST_ITERATIONS

@@ -301,8 +301,8 @@ class Experiment:
     def with_random_heat(self, times: RandomHeat) -> Experiment:
         """Experiment with other random heats than it has, without filters; `times` are factors on those assumed."""
         has = self.random_heat
-        further = RandomHeat(heat=times.heat / has.heat, wander=times.wander / has.wander, time=times.time / has.time,
-                             draught=times.draught)  # fmt: skip
+        further = RandomHeat(parts=tuple((times.heats / has.heats).tolist()), wander=times.wander / has.wander,
+                             time=times.time / has.time, draught=times.draught)  # fmt: skip
         noise = tuple(one.with_random_heat(further) for one in self.noise)
         return replace(self, noise=noise, random_heat=times, filters=None)
 

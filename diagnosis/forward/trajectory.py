@@ -151,8 +151,10 @@ def simulate(
         if change < settled_K:
             break
     assert found is not None  # noqa: S101 - rounds >= 1
-    # A conductance tilted below zero lets a standing gearbox heat itself for ever: no temperatures at all.
-    if float(np.max(np.abs(found.T))) > RUNAWAY_T:
+    # A conductance tilted below zero lets a standing gearbox heat itself for ever: no temperatures at all. And
+    # model error explains what is near the readings, not a course that it has to carry to where no law is linearised.
+    lowest, highest = (-RUNAWAY_T, RUNAWAY_T) if piece.error is None else (LOWEST_T, HIGHEST_T)
+    if not (lowest <= float(found.T.min()) and float(found.T.max()) <= highest):
         raise ArithmeticError(f"the temperatures of {piece.recording} run away with these parameters")
     return found
 

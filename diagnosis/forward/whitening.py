@@ -42,12 +42,20 @@ class RandomHeat:
         Factors on what is assumed in the parts, of what surroundings take from each, and of the correlation time
     draught : float
         Random share of all heat to the surroundings, as :attr:`Noise.draught`
+    parts : tuple of float, length parts or 0
+        Further factors on that of each part; none: 1
     """
 
     heat: float = 1.0
     wander: float = 1.0
     time: float = 1.0
     draught: float = 0.0
+    parts: tuple[float, ...] = ()
+
+    @property
+    def heats(self) -> Array:
+        """Factors on what is assumed in each part, shape (parts,), or (1,) if they are all the same."""
+        return self.heat * np.array(self.parts or (1.0,))
 
 
 AS_ASSUMED = RandomHeat()
@@ -97,7 +105,7 @@ class Noise:
 
     def with_random_heat(self, times: RandomHeat) -> Noise:
         """Noise with its random heats multiplied, and draughts."""
-        return replace(self, heat_sd=self.heat_sd * times.heat, wander=self.wander * times.wander,
+        return replace(self, heat_sd=self.heat_sd * times.heats, wander=self.wander * times.wander,
                        heat_time=self.heat_time * times.time, draught=times.draught)  # fmt: skip
 
 

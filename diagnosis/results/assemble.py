@@ -312,6 +312,8 @@ def _floor(setup: InferenceSetup, factors: RandomHeat) -> str:
     if setup.gearbox.is_parametric:  # watts are known but for a common factor
         share = PARAMETRIC_FRACTION
         text += f"; of a part of little heat capacity {factors.heat * PARAMETRIC_K:.2g} K"
+    less = {part.name: times for part, times in zip(setup.nominal.parts, factors.parts, strict=False) if times < 1.0}
+    text += "".join(f"; {100.0 * times:.2g} % of that in {name}" for name, times in less.items())
     together = f", and draughts of {100.0 * factors.draught:.2g} % of all of it" if factors.draught else ""
     return (f"random heat of {100.0 * factors.heat * share:.2g} % {text}; "
             f"of {100.0 * factors.wander * WANDER:.2g} % of the heat of each to the surroundings{together}; "

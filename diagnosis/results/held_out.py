@@ -65,8 +65,10 @@ def validate(
         Channels that do not count
     """
     counting = [name for name in setup.channels if name not in faulty]
-    draught = calibration.near.experiment.random_heat.draught
-    held_out = held_out_experiment(setup, experiment).with_random_heat(RandomHeat(draught=draught))
+    found = calibration.near.experiment.random_heat
+    held_out = held_out_experiment(setup, experiment).with_random_heat(
+        RandomHeat(draught=found.draught, parts=found.parts)
+    )
 
     def model_with(best: Judged | None) -> PredictingModel:
         return predict_recordings(

@@ -33,7 +33,9 @@ def test_the_losses_that_check_prints_are_the_models(
     home: Path, run_cli: RunCli, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run_cli("check", "la_haute_borne", "--output", "network.png") == 0
-    lines = {line.split("  ")[0]: line.split() for line in capsys.readouterr().out.splitlines() if "  " in line}
+    shown = capsys.readouterr().out
+    assert "200 to the surroundings in all" in shown  # 30 of pipes, 150 and 20 of the casing
+    lines = {line.split("  ")[0]: line.split() for line in shown.splitlines() if "  " in line}
     # At the reference every loss is what the definition states: 8000 + 20000 + 2 (1500 + 800) W.
     assert lines["total"][-1] == "32600"
     assert lines["viscosity, mm2/s"][-1] == "24"

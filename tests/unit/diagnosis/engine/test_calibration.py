@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 from diagnosis.engine import calibration as calibration_module
 from diagnosis.engine.calibration import (
@@ -105,8 +106,13 @@ def test_another_class_starts_at_the_same_point(found: Calibration) -> None:
     )
 
 
-def shaken(fzg: Gearbox, *, times: float, lasting: float = 1.0, draught: float = 0.0) -> Experiment:
-    """A machine with random heats in its parts: so many times as much as is assumed, and as lasting; and draughts."""
+def shaken(fzg: Gearbox, *, times: ArrayLike, lasting: float = 1.0, draught: float = 0.0) -> Experiment:
+    """A machine with random heats in its parts: so many times as much as is assumed, and as lasting; and draughts.
+
+    Parameters
+    ----------
+    times : array_like, shape (parts,) or ()
+    """
     train = recorded(fzg, "train", hours=6.0)
     _, experiment = prepare_experiment(fzg, [train], [train])
     point, noise = experiment.point(0, np.zeros(len(experiment.unknowns))), experiment.noise[0]
@@ -118,7 +124,7 @@ def shaken(fzg: Gearbox, *, times: float, lasting: float = 1.0, draught: float =
     from_air = (balance.conductances * balance.differences)[:, outside] @ model.to_parts[outside]
     now = rng.standard_normal(model.n + 1)
     for k, kept in enumerate(rho):
-        heat[k, : model.n, 0] = times * noise.heat_sd * now[:-1] + draught * from_air[k] * now[-1]
+        heat[k, : model.n, 0] = np.asarray(times) * noise.heat_sd * now[:-1] + draught * from_air[k] * now[-1]
         now = kept * now + np.sqrt(1.0 - kept**2) * rng.standard_normal(len(now))
     moved = point.heated(heat, np.zeros((len(rho), 1)))[:, :, 0]
     return with_measured(experiment, experiment.pieces[0].measured + moved)
@@ -145,6 +151,17 @@ def test_random_heats_are_never_raised_and_last_longer_without_geometry_alone(fz
     assert free.time > 1.0 and max(free.heat, free.wander) <= 1.0
 
 
+def test_without_geometry_each_part_has_as_much_random_heat_as_it_shows(fzg: Gearbox) -> None:
+    experiment = prepare_experiment(fzg, [recorded(fzg, "train", hours=6.0)])[1]
+    quiet = [part == "oil" for part in experiment.machine.model.parts]
+    capacity = float(experiment.point(0, np.zeros(len(experiment.unknowns))).trajectory.capacities.sum())
+    experiment = shaken(fzg, times=np.where(quiet, 0.0, 20.0))
+    loud = tuple(replace(one, heat_sd=20.0 * one.heat_sd) for one in experiment.noise)
+    assert likely(replace(experiment, noise=loud)).parts == ()
+    found = likely(replace(experiment, noise=tuple(replace(one, capacity=capacity) for one in loud)))
+    assert [times < 1.0 for times in found.parts] == quiet and found.heat == 1.0
+
+
 def test_draughts_are_assumed_where_the_readings_show_them(fzg: Gearbox, found: Calibration) -> None:
     """They change the heat of all parts to the surroundings by one share, 5 % at most."""
     assert calibrate_in_draughts(found) is None
@@ -159,10 +176,13 @@ def test_draughts_are_assumed_where_the_readings_show_them(fzg: Gearbox, found: 
 
 def test_random_heats_are_factors_on_what_is_assumed(found: Calibration) -> None:
     """Whatever the experiment has already."""
-    times = RandomHeat(heat=0.25, wander=0.5, draught=0.02)
-    again = found.near.experiment.with_random_heat(RandomHeat(heat=0.5, wander=0.125, time=2.0)).with_random_heat(times)
+    size = len(found.near.experiment.noise[0].heat_sd)
+    times = RandomHeat(heat=0.25, wander=0.5, draught=0.02, parts=(0.5,) * size)
+    has = RandomHeat(heat=0.5, wander=0.125, time=2.0, parts=(*(1.0,) * (size - 1), 0.25))
+    again = found.near.experiment.with_random_heat(has).with_random_heat(times)
     back = found.near.experiment.with_random_heat(times)
     assert again.random_heat == back.random_heat == times
-    for one, other in zip(again.noise, back.noise, strict=True):
+    for one, other, assumed in zip(again.noise, back.noise, found.near.experiment.noise, strict=True):
         np.testing.assert_array_equal(one.heat_sd, other.heat_sd)
+        np.testing.assert_array_equal(one.heat_sd, 0.125 * assumed.heat_sd / found.near.experiment.random_heat.heats)
         assert (one.wander, one.heat_time, one.draught) == (other.wander, other.heat_time, 0.02)

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.forward.grid import Piece, pieces
+from diagnosis.forward.grid import ErrorCourse, Piece, pieces
 from diagnosis.forward.matrix_exponential import exponential
-from diagnosis.forward.network_on_grid import SLOW_NEAR_K, SLOW_REACH_K, NetworkOnGrid
+from diagnosis.forward.network_on_grid import HIGHEST_T, SLOW_NEAR_K, SLOW_REACH_K, NetworkOnGrid
 from diagnosis.forward.recurrence import lagged
 from diagnosis.forward.term_on_grid import TermOnGrid, input_slope
 from diagnosis.forward.trajectory import parameter_heat, settled_balance, simulate
@@ -144,6 +144,18 @@ def test_temperatures_that_run_away_are_no_trajectory(model: NetworkOnGrid, piec
     hot = NetworkOnGrid(network, model.losses)
     with pytest.raises(ArithmeticError, match="run away"):
         simulate(hot, piece, hot.start, np.full(hot.n, 60.0))
+
+
+def test_model_error_explains_nothing_beyond_where_laws_are_linearised(model: NetworkOnGrid, piece: Piece) -> None:
+    """A machine may be as hot as it likes; heat that is assumed to carry it there is no explanation."""
+    heat = np.zeros((len(piece.steps), model.n))
+    heat[:, model.part_index("oil")] = 5000.0
+    error = ErrorCourse(heat=heat, loss=np.zeros(len(heat)), reading=np.zeros((len(heat) + 1, len(piece.channels))))
+    heated = NetworkOnGrid(model.network.with_source("oil", lambda _: 5000.0, name="heater"), model.losses)
+    start = np.full(model.n, 60.0)
+    assert HIGHEST_T < simulate(heated, piece, heated.start, start).T.max() < 1500.0
+    with pytest.raises(ArithmeticError, match="run away"):
+        simulate(model, replace(piece, error=error), model.start, start)
 
 
 @pytest.mark.parametrize(

@@ -155,17 +155,20 @@ def test_held_out_readings_are_judged_in_the_draughts_of_the_machine(
         return -1.0 if len(judged_in) % 2 else 0.0
 
     monkeypatch.setattr(predictions, "log_score_gain", gain)
-    for draught in (0.0, 0.03):
-        there = replace(near, experiment=near.experiment.with_random_heat(RandomHeat(heat=0.25, draught=draught)))
+    parts = (0.5, *(1.0,) * (len(experiment.noise[0].heat_sd) - 1))
+    for draught, of_parts in ((0.0, ()), (0.03, parts)):
+        times = RandomHeat(heat=0.25, draught=draught, parts=of_parts)
+        there = replace(near, experiment=near.experiment.with_random_heat(times))
         found = assemble(setup, experiment, posterior_of(plain, windage), [], plain=plain,
                          calibration=replace(calibration, near=there))  # fmt: skip
         assert ("draughts of 3 % of all of it" in found.floor) is (draught > 0.0)
+        assert (f"50 % of that in {setup.nominal.parts[0].name}" in found.floor) is bool(of_parts)
         assert found.holdout_gain == 0.0  # with a measured loss no finer than what predicts is calibrated to
     still, coarse, draughty, _ = judged_in
     assert (still.draught, draughty.draught) == (0.0, 0.03)
     coarser = coarse.channel_sd > still.channel_sd
     assert [name for name, one in zip(setup.channels, coarser, strict=True) if one] in ([], ["P_loss"])
-    np.testing.assert_array_equal(draughty.heat_sd, still.heat_sd)  # as assumed
+    np.testing.assert_array_equal(draughty.heat_sd, still.heat_sd * parts)  # as assumed, less where parts have less
 
 
 def test_scorers_read_the_numbers(claimed: Diagnosis, fzg: Gearbox) -> None:
