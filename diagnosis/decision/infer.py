@@ -24,6 +24,7 @@ from diagnosis.decision.posterior import Assumed, Judged, Posterior
 from diagnosis.decision.scanned import (
     WHOLE,
     Scanned,
+    as_fits_show,
     counts_less,
     expected_of,
     judge_alone,
@@ -81,7 +82,7 @@ def infer(
         progress("judging the baselines as if they were tested")
     placebo, candidates = judge_baselines(calibration, found.candidates, candidates_in)
     found = replace(found, candidates=candidates)
-    first = scan_in_classes(calibration, found)
+    first = as_fits_show(calibration, scan_in_classes(calibration, found))
     starts: list[tuple[Scanned, StartOf]] = [(first, lambda one: calibration.in_class(one).fit)]
     if calibration.is_far:
         progress("scanning from the middles of the priors too")

@@ -20,6 +20,7 @@ from diagnosis.engine.sessions import OverSessions, over_sessions
 from models.base.types import Array
 
 WHOLE = {"swapped": (0.7, 1.3), "stuck": (0.3, np.inf)}  # share that a fault has which an instrument has or has not
+AHEAD = 1.0  # nats, from which a class that was not chosen has to show by a fit what straight lines promise
 LEAST_SHARE = 0.1  # the least of these by a straight line, which may be far off
 OVER_TIME = ("from_date", "carried_on", "over_hours")  # effects that change over time
 WORSE, LEAST_DEVIATION = 2.0, 0.05  # times the deviation between sessions; prior standard deviations
@@ -99,6 +100,21 @@ def scan_in_classes(calibration: Calibration, found: Scan, classes: Sequence[Err
     chosen = [one for one in judged if one[0].name == calibration.chosen.error_class.name] or judged
     nothing, *_, reached = max(chosen, key=lambda one: one[-1])
     each = [_in_class(one, here, over, evidence - reached, nothing) for one, here, over, evidence in judged]
+    return in_best_classes(each)
+
+
+def as_fits_show(calibration: Calibration, found: Scanned) -> Scanned:
+    """The scan, with each class that is ahead of the chosen one held to what a fit without an effect reaches in it.
+
+    A class that lacks what the chosen one has needs other values of the unknowns, and straight lines may go too far.
+    """
+    each = []
+    for one in found.classes:
+        ahead = one.ahead
+        if ahead > AHEAD:
+            reached = calibration.fitted_in_class(one.error_class)
+            ahead = min(ahead, reached.log_evidence - calibration.chosen.log_evidence)
+        each.append(replace(one, ahead=ahead, log_bayes=one.log_bayes + ahead - one.ahead))
     return in_best_classes(each)
 
 

@@ -26,6 +26,7 @@ from diagnosis.decision.posterior import KINDS, Judged, Posterior
 from diagnosis.decision.scanned import (
     ScanInClass,
     Scanned,
+    as_fits_show,
     counts_less,
     hardly_there,
     in_best_classes,
@@ -389,6 +390,23 @@ def test_names_share_the_race() -> None:
     chosen = _worth_a_fit(scanned_as(candidates, log_bayes))
     names = [candidates[i].name for i in chosen]
     assert len(set(names)) == RACED and names.count("one") == PLACES
+
+
+def test_a_class_that_straight_lines_put_ahead_has_to_show_it_by_a_fit(fzg: Gearbox) -> None:
+    calibration, candidates_in = calibrated(fzg, 0.0)
+    found = scan_in_classes(calibration, scan_at(calibration, candidates_in(calibration.fit.experiment)))
+    other, *rest = sorted(found.classes, key=lambda one: one.error_class == calibration.chosen.error_class)
+    assert other.error_class != calibration.chosen.error_class
+    promised = replace(other, ahead=other.ahead + 500.0, log_bayes=other.log_bayes + 500.0)
+    shown = as_fits_show(calibration, in_best_classes([promised, *rest]))
+    reached = calibration.fitted_in_class(other.error_class)
+    less = shown.in_class(other.error_class)
+    assert less.ahead == pytest.approx(reached.log_evidence - calibration.chosen.log_evidence) and less.ahead < 5.0
+    np.testing.assert_allclose(less.log_bayes, other.log_bayes + less.ahead - other.ahead)
+    assert calibration.in_class(other.error_class) is reached  # fits in that class begin there
+    for one in rest:
+        if one.ahead <= 1.0:
+            np.testing.assert_array_equal(shown.in_class(one.error_class).log_bayes, one.log_bayes)
 
 
 def test_every_candidate_is_judged_in_the_class_that_suits_it() -> None:
