@@ -258,7 +258,7 @@ def _remove_spikes(found: RecordedRows, gap: float) -> None:
         if wrong.any():
             found.values[quantity] = np.where(wrong, np.nan, values)
             name, where = found.names.get(quantity, quantity), rows_text(found.rows[wrong])
-            found.notes.append(f"{name}: {int(wrong.sum())} outliers and dropouts in {where} taken as missing")
+            found.notes.append(f"{name}: outliers and dropouts in {where}, {int(wrong.sum())} in all, taken as missing")
 
 
 def _note_stuck(found: RecordedRows) -> None:

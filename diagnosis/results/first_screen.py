@@ -190,7 +190,7 @@ def _where(d: Diagnosis) -> tuple[str, ...]:
     way = "taken away" if place.heat_mean_W < 0.0 else "added"
     mean, most = number(abs(place.heat_mean_W)), number(abs(place.heat_max_W))
     where = "" if place is d.places[0] else f"in {' and '.join(place.nodes)} "
-    heat = f"{where}{mean} W {way} on average, {most} W at most"
+    heat = f"{where}{mean} W {way} on average over the recordings, {most} W at most"
     return (f"{told}; {heat}; {place.regime}",)
 
 

@@ -79,7 +79,9 @@ def _boundary_input(boundary: Boundary, definition: MachineDefinition) -> Iterat
 
 
 def link_faults(definition: MachineDefinition) -> Iterator[str]:
-    """Yield a line per end of a link that is not there, and per link that joins what cannot be joined or is already."""
+    """Yield a line per end of a link that is not there, per link that joins what cannot be joined or is already, and
+    per part that no links lead from to any surroundings.
+    """
     boundaries = [*definition.own_boundaries, *(b.name for b in definition.boundary)]
     ends = [*definition.own_parts, *(part.name for part in definition.part), *boundaries]
     joined: list[frozenset[str]] = []
@@ -95,3 +97,12 @@ def link_faults(definition: MachineDefinition) -> Iterator[str]:
         if pair in joined:
             yield f"{place}: {' and '.join(link.between)} are joined already"
         joined.append(pair)
+    reached = {*boundaries, *definition.own_parts}  # the geometry joins its parts
+    while more := {name for pair in joined if pair & reached for name in pair} - reached:
+        reached |= more
+    for part in definition.part:
+        if part.name not in reached:
+            yield (
+                f"part '{part.name}': no links lead from it to a [[boundary]], so it would warm for ever; "
+                "add a [[link]] to surroundings, or to a part that has one"
+            )

@@ -331,7 +331,7 @@ def test_cleaning_is_reported_with_rows(tmp_path: Path, network: ThermalNetwork)
     assert np.isnan(channel(recording, "pinion")[60])
     notes = "\n".join(recording.notes)
     assert "T_oil_degC: 1 of 200 values (row 31) outside" in notes
-    assert "T_pinion_degC: 1 outliers and dropouts in row 61" in notes
+    assert "T_pinion_degC: outliers and dropouts in row 61, 1 in all, taken as missing" in notes
 
 
 def test_a_comment_between_rows_is_skipped_and_a_hash_in_a_cell_is_not(tmp_path: Path, network: ThermalNetwork) -> None:

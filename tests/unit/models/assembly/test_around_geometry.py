@@ -120,6 +120,14 @@ def test_faults_are_named(old: str, new: str, message: str) -> None:
         around_fzg((old, new))
 
 
+def test_a_part_that_cannot_shed_heat_is_refused() -> None:
+    wind = load_gearbox("la_haute_borne")
+    nowhere = {"link.1.between": ("oil_inlet", "casing"), "link.3.between": ("oil_inlet", "bearing_1")}
+    assert wind.with_values(nowhere).hash != wind.hash  # the casing leads outdoors
+    with pytest.raises(InputError, match=r"part 'oil': no links lead from it to a \[\[boundary\]\]"):
+        wind.with_values(nowhere | {"link.4.between": ("oil_inlet", "bearing_2")})
+
+
 def test_what_was_understood_shows_them(machine: Gearbox, fzg: Gearbox) -> None:
     """Heat of the motor at a tenth, at half and at all of 3000 1/min and 350 N m, where [training] ends."""
     nodes, links, _, _, heats = understood(machine)[:5]
