@@ -97,6 +97,8 @@ def link_faults(definition: MachineDefinition) -> Iterator[str]:
         if pair in joined:
             yield f"{place}: {' and '.join(link.between)} are joined already"
         joined.append(pair)
+    if not all(pair <= set(ends) for pair in joined):
+        return  # a link may be meant to lead there
     reached = {*boundaries, *definition.own_parts}  # the geometry joins its parts
     while more := {name for pair in joined if pair & reached for name in pair} - reached:
         reached |= more
