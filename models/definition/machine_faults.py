@@ -79,8 +79,9 @@ def _boundary_input(boundary: Boundary, definition: MachineDefinition) -> Iterat
 
 
 def link_faults(definition: MachineDefinition) -> Iterator[str]:
-    """Yield a line per end of a link that is not there, per link that joins what cannot be joined or is already, and
-    per part that no links lead from to any surroundings.
+    """Yield a line per end of a link that is not there, and per link that joins what cannot be joined or is already.
+
+    If every end is there, also per part that no links lead from to any surroundings.
     """
     boundaries = [*definition.own_boundaries, *(b.name for b in definition.boundary)]
     ends = [*definition.own_parts, *(part.name for part in definition.part), *boundaries]
@@ -97,9 +98,12 @@ def link_faults(definition: MachineDefinition) -> Iterator[str]:
         if pair in joined:
             yield f"{place}: {' and '.join(link.between)} are joined already"
         joined.append(pair)
-    if not all(pair <= set(ends) for pair in joined):
-        return  # a link may be meant to lead there
-    reached = {*boundaries, *definition.own_parts}  # the geometry joins its parts
+    if all(pair <= set(ends) for pair in joined):  # else a link may be meant to lead there
+        yield from _isolated(definition, joined, {*boundaries, *definition.own_parts})
+
+
+def _isolated(definition: MachineDefinition, joined: list[frozenset[str]], reached: set[str]) -> Iterator[str]:
+    """Yield a line per part without a way to what is reached: surroundings, and parts that the geometry joins to them."""
     while more := {name for pair in joined if pair & reached for name in pair} - reached:
         reached |= more
     for part in definition.part:
