@@ -103,7 +103,7 @@ def link_faults(definition: MachineDefinition) -> Iterator[str]:
 
 
 def _isolated(definition: MachineDefinition, joined: list[frozenset[str]], reached: set[str]) -> Iterator[str]:
-    """Yield a line per part without a way to what is reached: surroundings, and parts that the geometry joins to them."""
+    """Yield a line per part without a way to surroundings, or to parts that the geometry joins to them."""
     while more := {name for pair in joined if pair & reached for name in pair} - reached:
         reached |= more
     for part in definition.part:
