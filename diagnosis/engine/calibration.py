@@ -210,7 +210,7 @@ class Calibration:
     near: NearReadings
     of_others: Calibration | None = None
     _known: dict[str, InClass] = field(default_factory=dict, init=False)
-    _fitted: dict[str, InClass] = field(default_factory=dict, init=False)
+    _fitted: set[str] = field(default_factory=set, init=False)
     _middles: dict[str, Fit] = field(default_factory=dict, init=False)
 
     @property
@@ -247,8 +247,9 @@ class Calibration:
     def fitted_in_class(self, one: ErrorClass) -> InClass:
         """The machine fitted with model error of another class; fits in that class start there from then on."""
         if one.name not in self._fitted:
-            self._known[one.name] = self._fitted[one.name] = self.near.fitted(one, self.fit, self.chosen.deviation)
-        return self._fitted[one.name]
+            self._known[one.name] = self.near.fitted(one, self.fit, self.chosen.deviation)
+            self._fitted.add(one.name)
+        return self._known[one.name]
 
     def at_middles(self, one: ErrorClass) -> Fit:
         """The machine with model error of a class at the middles of the priors: another start for fits in that class.

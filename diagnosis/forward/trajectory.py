@@ -131,7 +131,7 @@ def simulate(
     Raises
     ------
     ArithmeticError
-        If the temperatures leave all bounds.
+        If the temperatures leave all bounds; with model error, those where laws are linearised.
     """
     tangent = guess.tangent if isinstance(guess, Trajectory) else None
     if isinstance(guess, Trajectory):

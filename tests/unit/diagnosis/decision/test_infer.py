@@ -46,6 +46,7 @@ from diagnosis.engine.unknown import TermParameter
 from diagnosis.results import notes
 from diagnosis.results.findings import heats_of, values_of
 from models.assembly.gearbox import Gearbox
+from models.base.errors import InputError
 from models.base.progress import silent
 from models.base.types import Array
 from models.mechanisms import CATALOGUE, Placed, Scale
@@ -352,6 +353,10 @@ def test_fits_begin_at_the_middles_of_the_priors_too_where_the_calibration_went_
     best = max(posterior.judged, key=lambda one: one.weight)
     assert best.fit is not None and best.names == ("windage",)
     assert calibration.at_middles(calibration.chosen.error_class).z.tolist() == [0.0] * len(calibration.fit.z)
+    monkeypatch.setattr(infer_module, "scan", lambda *_: (_ for _ in ()).throw(InputError("below absolute zero")))
+    begun.clear()
+    infer(calibration, scan_at(calibration, [hypothesis_of(one) for one in placed]), Settings())
+    assert begun == [False]  # from there alone
 
 
 def named(name: str, place: str) -> Hypothesis:
@@ -392,9 +397,12 @@ def test_names_share_the_race() -> None:
     assert len(set(names)) == RACED and names.count("one") == PLACES
 
 
-def test_a_class_that_straight_lines_put_ahead_has_to_show_it_by_a_fit(fzg: Gearbox) -> None:
+def test_a_class_that_straight_lines_put_ahead_has_to_show_it_by_a_fit(
+    fzg: Gearbox, monkeypatch: pytest.MonkeyPatch
+) -> None:
     calibration, candidates_in = calibrated(fzg, 0.0)
-    found = scan_in_classes(calibration, scan_at(calibration, candidates_in(calibration.fit.experiment)))
+    scanned = scan_at(calibration, candidates_in(calibration.fit.experiment))
+    found = scan_in_classes(calibration, scanned)
     other, *rest = sorted(found.classes, key=lambda one: one.error_class == calibration.chosen.error_class)
     assert other.error_class != calibration.chosen.error_class
     promised = replace(other, ahead=other.ahead + 500.0, log_bayes=other.log_bayes + 500.0)
@@ -407,6 +415,9 @@ def test_a_class_that_straight_lines_put_ahead_has_to_show_it_by_a_fit(fzg: Gear
     for one in rest:
         if one.ahead <= 1.0:
             np.testing.assert_array_equal(shown.in_class(one.error_class).log_bayes, one.log_bayes)
+    monkeypatch.setattr(infer_module, "scan_in_classes", lambda *_: in_best_classes([promised, *rest]))
+    posterior = infer(calibration, scanned, Settings(), candidates_in=candidates_in)
+    assert not posterior.detected and posterior.log_parameter < posterior.threshold
 
 
 def test_every_candidate_is_judged_in_the_class_that_suits_it() -> None:
