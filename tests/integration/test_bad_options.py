@@ -122,6 +122,7 @@ WRONG = {
         "--target python --platforms host": "--platforms is about native FMUs",
         "--target python --fmi 3": "--fmi is about native FMUs, the Python FMU is FMI 2.0",
         "--claims-only": "--claims-only is about --correction",
+        "--gearbox heated_rod --samples 300": "has no geometry: its FMU holds the laws of its losses and no networks",
         "--couple fram": "'fram' is not a boundary of this network; did you mean 'frame'?",
         "--output file/out": "file/out: cannot be written",
         "--dask nonsense": "no dask scheduler answers at nonsense",
