@@ -59,11 +59,6 @@ def build_fmu(
     if fmi is not None and target == "python":
         raise click.UsageError("--fmi is about native FMUs, the Python FMU is FMI 2.0; give it without --target python")
     definition = load_gearbox(gearbox)
-    if definition.is_parametric and (samples is not None or retrain or preset != "default"):
-        raise click.UsageError(
-            f"{definition.file} has no geometry: its FMU holds the laws of its losses and no networks; give it without "
-            "--samples, --preset and --retrain"
-        )
     found = None if correction is None else correction.read(definition)
     folder = output if output is not None else Path("out") / Path(gearbox).stem
     with progress("starting") as told:

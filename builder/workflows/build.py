@@ -214,7 +214,7 @@ def build(
     fmi : str
         Version of the native FMU: ``2``, ``3`` or ``both``
     preset, samples, seed, jobs, dask
-        See :func:`builder.surrogate.train.train_surrogate`
+        See :func:`builder.surrogate.train.train_surrogate`; `preset`, `samples` and `retrain` with geometry alone
     correction : Correction or None
         What a diagnosis found: the FMU and the full model it is compared with carry it
     couple : sequence of str
@@ -248,6 +248,11 @@ def build(
     """
     gearbox, folder = gearbox if isinstance(gearbox, Gearbox) else load_gearbox(gearbox), Path(folder)
     name = name or Path(gearbox.file).stem
+    if gearbox.is_parametric and (samples is not None or retrain or preset != "default"):
+        raise InputError(
+            f"{gearbox.file}: has no geometry, so its FMU holds laws and no networks; "
+            "leave out samples, preset and retrain"
+        )
     kinds, built_for, notes = _planned(target, platforms, fmi)
     network = corrected_network(gearbox, correction)
     for boundary in dict.fromkeys(couple):
